@@ -1,0 +1,22 @@
+"""Settings of the render stage."""
+
+from pydantic import Field
+
+from perpetua.config_base import Section
+
+
+class RenderConfig(Section):
+    """What Blender is asked for."""
+
+    width_px: int = Field(512, ge=16, le=4096, description="image width, pixels")
+    height_px: int = Field(512, ge=16, le=4096, description="image height, pixels")
+    samples: int = Field(32, ge=1, le=16384, description="Cycles samples per pixel")
+    denoise: bool = Field(True, description="denoise with Open Image Denoise, guided by albedo and normal")
+    max_bounces: int = Field(6, ge=0, le=64, description="light bounces")
+    jpeg_quality: int = Field(95, ge=1, le=100, description="JPEG quality")
+    max_texels: int = Field(
+        4_000_000, ge=0, description="texels baked from a room's procedural materials; 0 keeps flat colours"
+    )
+    frame_timeout_s: float = Field(1800.0, ge=5.0, description="longest time without progress, seconds")
+    max_restarts: int = Field(3, ge=0, le=100, description="restarts of Blender after a crash or a hang")
+    blender: str | None = Field(None, description="a Blender program to render with; none: the bpy package")

@@ -1,0 +1,28 @@
+"""Settings of the room stage."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from perpetua.config_base import Section
+
+RoomKind = Literal["bathroom", "bedroom", "diningroom", "kitchen", "livingroom"]
+
+
+class RoomsConfig(Section):
+    """Where rooms come from and what makes one acceptable."""
+
+    source: str = Field("infinigen", description="room source: infinigen or procedural")
+    kinds: tuple[RoomKind, ...] = Field(
+        ("bathroom", "bedroom", "diningroom", "kitchen", "livingroom"),
+        description="room kinds to draw from",
+        min_length=1,
+    )
+    min_side_m: float = Field(5.0, ge=3.0, le=12.0, description="shortest side of the floor, metres")
+    max_side_m: float = Field(8.0, ge=3.0, le=15.0, description="longest side of the floor, metres")
+    min_free_floor_m2: float = Field(
+        6.0, ge=1.0, le=200.0, description="least connected floor that a person can walk on, square metres"
+    )
+    max_redraws: int = Field(5, ge=0, le=50, description="further rooms tried when one is rejected")
+    timeout_s: float = Field(600.0, ge=10.0, description="longest time to generate one room, seconds")
+    max_triangles: int = Field(3_000_000, ge=1000, description="triangles allowed in one room")

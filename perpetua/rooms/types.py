@@ -1,0 +1,78 @@
+"""What the room stage hands on."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64, UInt8
+
+from perpetua.geometry.mesh import TriMesh
+
+ROOM_KINDS = ("bathroom", "bedroom", "diningroom", "kitchen", "livingroom")
+
+
+@dataclass(frozen=True)
+class Material:
+    """A surface that is cheap to render: one colour, a node pattern, or an image through the mesh's UVs.
+
+    ``base_color`` and ``second_color`` are linear RGB in [0, 1]. ``pattern`` is one of "plain", "wood", "fabric",
+    "tile", "plaster", "marble", "checks", "stripes"; ``scale_m`` is the size of its repeat in metres. ``image`` is an
+    sRGB texture (row 0 on top); it replaces colour and pattern. ``emission_w_m2`` > 0 makes the surface a lamp.
+    """
+
+    name: str
+    base_color: tuple[float, float, float]
+    second_color: tuple[float, float, float] = (0.5, 0.5, 0.5)
+    roughness: float = 0.6
+    metallic: float = 0.0
+    pattern: str = "plain"
+    scale_m: float = 0.1
+    image: UInt8[np.ndarray, "H W 3"] | None = None
+    emission_w_m2: float = 0.0
+
+
+@dataclass(frozen=True)
+class AreaLight:
+    """A rectangular lamp that shines along ``direction``; ``power_w`` is Blender's radiant watts."""
+
+    position_m: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    size_m: tuple[float, float]
+    power_w: float
+    color: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One rendered thing of a room, exactly as rendered.
+
+    ``mesh`` is in world coordinates; in a .blend the object with this ``object_index`` as pass index has the same
+    triangles. ``material`` is None where the room's .blend carries it. ``walkable``: a person may stand on its
+    upward faces. ``opaque``: depth and object index are well defined on it.
+    """
+
+    object_index: int
+    name: str
+    category: str
+    mesh: TriMesh
+    material: Material | None
+    walkable: bool
+    opaque: bool
+
+
+@dataclass(frozen=True)
+class Room:
+    """A furnished room. World origin on the floor (z = 0) under the middle of ``floor_polygon_m``."""
+
+    name: str
+    kind: str
+    floor_polygon_m: Float64[np.ndarray, "K 2"]
+    height_m: float
+    objects: tuple[SceneObject, ...]
+    lights: tuple[AreaLight, ...]
+    blend_path: Path | None
+
+    @property
+    def next_object_index(self) -> int:
+        """The first object index that the room leaves free."""
+        return max(thing.object_index for thing in self.objects) + 1
