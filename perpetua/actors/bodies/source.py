@@ -1,0 +1,45 @@
+"""What a body model is."""
+
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float32
+
+from perpetua.actors.config import ActorsConfig
+from perpetua.actors.types import ActorPart, BodyMotion, Skeleton
+from perpetua.registry import Registry
+from perpetua.seeding import StageSeed
+
+
+class Body(Protocol):
+    """One dressed person: a shape, garments, hair and shoes, ready to be posed."""
+
+    @property
+    def description(self) -> str:
+        """The person in plain words: age, build, clothes."""
+        ...
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The bones that motion is made for."""
+        ...
+
+    @property
+    def parts(self) -> tuple[ActorPart, ...]:
+        """Body, garments, hair and shoes; their faces index the vertices that ``pose`` returns."""
+        ...
+
+    def pose(self, motion: BodyMotion) -> Float32[np.ndarray, "T P 3"]:
+        """World positions in metres of all vertices at each frame of the motion."""
+        ...
+
+
+class BodyModel(Protocol):
+    """Draws bodies; the same arguments give the same body, bit for bit."""
+
+    def draw(self, actor: int, config: ActorsConfig, seed: StageSeed) -> Body:
+        """The body of one actor of a room; actors of one room differ in looks."""
+        ...
+
+
+BODY_MODELS: Registry[type[BodyModel]] = Registry("actors.body")
