@@ -1,0 +1,139 @@
+"""The work area: one folder per stage and room, complete or absent, known by its key.
+
+A stage is computed in ``NN_stage.partial`` and renamed to ``NN_stage`` when its manifest is written. A manifest
+with another key, or an output whose hash differs, is as good as none.
+"""
+
+import hashlib
+import importlib.metadata
+import json
+import os
+import shutil
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+MANIFEST_FILE = "manifest.json"
+KEY_FILE = "key"
+LIBRARIES = ("anny", "bpy", "infinigen", "numpy", "scipy", "torch", "trimesh")
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What one finished stage says of itself."""
+
+    key: str
+    stage: str
+    version: int
+    seed: int
+    room: int
+    inputs: dict[str, str]
+    outputs: dict[str, str]
+    seconds: float
+    peak_memory_mb: float
+    libraries: dict[str, str] = field(default_factory=dict)
+
+
+def canonical_json(value: object) -> str:
+    """JSON with sorted keys and no spaces: equal values give equal text."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+
+
+def key_of(value: object) -> str:
+    """SHA-256 of the canonical JSON."""
+    return hashlib.sha256(canonical_json(value).encode()).hexdigest()
+
+
+def file_sha256(path: Path) -> str:
+    """SHA-256 of a file's content."""
+    with path.open("rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()
+
+
+def output_hashes(folder: Path) -> dict[str, str]:
+    """SHA-256 of every file below a folder but the manifest, by relative name."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {
+        path.relative_to(folder).as_posix(): file_sha256(path)
+        for path in files
+        if path.relative_to(folder).as_posix() not in (MANIFEST_FILE, KEY_FILE)
+    }
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of the libraries that decide a stage's bits."""
+    versions = {}
+    for name in LIBRARIES:
+        try:
+            versions[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return versions
+
+
+class StageFolder:
+    """One stage of one room on disk."""
+
+    def __init__(self, room_folder: Path, number: int, stage: str) -> None:
+        self.final = room_folder / f"{number:02d}_{stage}"
+        self.partial = room_folder / f"{number:02d}_{stage}.partial"
+
+    def manifest(self) -> Manifest | None:
+        """The manifest of the finished stage, or None where there is none that can be read."""
+        try:
+            content = json.loads((self.final / MANIFEST_FILE).read_text(encoding="utf-8"))
+            return Manifest(**content)
+        except (OSError, ValueError, TypeError):
+            return None
+
+    def is_complete(self, key: str) -> bool:
+        """Whether the stage is finished under this key and every output still has its hash."""
+        manifest = self.manifest()
+        return manifest is not None and manifest.key == key and output_hashes(self.final) == manifest.outputs
+
+    def begin(self, key: str, resumable: bool) -> Path:
+        """An empty partial folder, or the one an interrupted run left under the same key."""
+        key_file = self.partial / KEY_FILE
+        left_key = key_file.read_text(encoding="utf-8") if key_file.is_file() else None
+        if not (resumable and left_key == key):
+            shutil.rmtree(self.partial, ignore_errors=True)
+            self.partial.mkdir(parents=True)
+            key_file.write_text(key, encoding="utf-8")
+        return self.partial
+
+    def finish(self, manifest: Manifest) -> None:
+        """Writes the manifest and moves the partial folder into place."""
+        path = self.partial / MANIFEST_FILE
+        path.write_text(json.dumps(asdict(manifest), indent=1, sort_keys=True) + "\n", encoding="utf-8")
+        (self.partial / KEY_FILE).unlink(missing_ok=True)
+        replace_folder(self.partial, self.final)
+
+
+def replace_folder(source: Path, target: Path) -> None:
+    """Renames ``source`` to ``target``; what stood at ``target`` is removed after it is out of the way."""
+    old = target.with_name(f".{target.name}.old")
+    shutil.rmtree(old, ignore_errors=True)
+    if target.exists():
+        target.rename(old)
+    source.rename(target)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Writes JSON so that a reader sees the old file or the new one, never half."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    temporary.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    temporary.replace(path)
+
+
+def link_tree(source: Path, target: Path) -> None:
+    """A copy of a folder that shares the files' space where the file system can."""
+
+    def link(from_path: str, to_path: str) -> None:
+        try:
+            os.link(from_path, to_path)
+        except OSError:
+            shutil.copy2(from_path, to_path)
+
+    shutil.copytree(source, target, copy_function=link)
