@@ -1,0 +1,85 @@
+"""Which rooms are good enough to go on with; a room that is not is drawn again."""
+
+import numpy as np
+
+from perpetua.errors import NavigationError
+from perpetua.navigation.config import NavigationConfig
+from perpetua.navigation.grid import build_nav_grid
+from perpetua.rooms.config import RoomsConfig
+from perpetua.rooms.types import Room
+
+# For each kind, the furniture it is recognised by: of every group at least one category must be in the room.
+REQUIRED_FURNITURE: dict[str, tuple[frozenset[str], ...]] = {
+    "bathroom": (frozenset({"toilet", "bathtub", "shower"}), frozenset({"sink", "bathroom_cabinet"})),
+    "bedroom": (frozenset({"bed"}),),
+    "diningroom": (frozenset({"dining_table", "table"}), frozenset({"chair"})),
+    "kitchen": (frozenset({"kitchen_counter", "kitchen_cabinet", "kitchen_island", "oven", "sink"}),),
+    "livingroom": (frozenset({"sofa", "armchair"}),),
+}
+
+MAX_OBJECT_INDEX = np.iinfo(np.uint16).max
+
+
+class RoomRejected(Exception):
+    """This draw of a room is no use, and another may be; ``rule`` is the short name under which it is counted."""
+
+    def __init__(self, rule: str, message: str) -> None:
+        super().__init__(message)
+        self.rule = rule
+
+
+def check_room(room: Room, config: RoomsConfig, navigation: NavigationConfig) -> None:
+    """Passes a room that has what the later stages need.
+
+    Raises:
+        RoomRejected: object indices clash or do not fit 16 bits, a vertex is not finite, the room has too many
+            triangles, its kind's furniture is missing, or too little connected floor is free.
+    """
+    _check_object_indices(room)
+    _check_vertices(room)
+    _check_triangles(room, config.max_triangles)
+    _check_furniture(room)
+    _check_free_floor(room, config.min_free_floor_m2, navigation)
+
+
+def _check_object_indices(room: Room) -> None:
+    indices = [thing.object_index for thing in room.objects]
+    if len(set(indices)) != len(indices):
+        twice = sorted({index for index in indices if indices.count(index) > 1})
+        raise RoomRejected("object indices", f"object indices must be unique, but {twice[:5]} occur more than once")
+    outside = [index for index in indices if not 1 <= index <= MAX_OBJECT_INDEX]
+    if outside:
+        raise RoomRejected("object indices", f"object indices must lie in 1..{MAX_OBJECT_INDEX}, not {outside[:5]}")
+
+
+def _check_vertices(room: Room) -> None:
+    for thing in room.objects:
+        if not np.isfinite(thing.mesh.vertices_m).all():
+            raise RoomRejected("finite vertices", f"every vertex must be finite, but some of '{thing.name}' are not")
+
+
+def _check_triangles(room: Room, max_triangles: int) -> None:
+    triangles = sum(len(thing.mesh.faces) for thing in room.objects)
+    if triangles > max_triangles:
+        raise RoomRejected("triangles", f"the room has {triangles} triangles; rooms.max_triangles is {max_triangles}")
+
+
+def _check_furniture(room: Room) -> None:
+    present = {thing.category for thing in room.objects}
+    for group in REQUIRED_FURNITURE[room.kind]:
+        if present.isdisjoint(group):
+            wanted = " or ".join(f"'{category}'" for category in sorted(group))
+            raise RoomRejected("furniture", f"a {room.kind} needs {wanted}, and this one has none")
+
+
+def _check_free_floor(room: Room, min_free_floor_m2: float, navigation: NavigationConfig) -> None:
+    try:
+        free_floor_m2 = build_nav_grid(room, navigation).free_floor_m2
+    except NavigationError as error:
+        raise RoomRejected("free floor", str(error)) from error
+    if free_floor_m2 < min_free_floor_m2:
+        raise RoomRejected(
+            "free floor",
+            f"{free_floor_m2:.1f} square metres of connected floor are free; "
+            f"rooms.min_free_floor_m2 is {min_free_floor_m2:.1f}",
+        )
