@@ -1,0 +1,1 @@
+"""Where rooms are worked on: processes of this machine."""

@@ -105,7 +105,6 @@ class StageFolder:
         """Writes the manifest and moves the partial folder into place."""
         path = self.partial / MANIFEST_FILE
         path.write_text(json.dumps(asdict(manifest), indent=1, sort_keys=True) + "\n", encoding="utf-8")
-        (self.partial / KEY_FILE).unlink(missing_ok=True)
         replace_folder(self.partial, self.final)
 
 

@@ -1,0 +1,131 @@
+"""Where a run keeps what: the one place that knows the names below the output folder."""
+
+import fcntl
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from perpetua.config import Config
+from perpetua.errors import InputError, PerpetuaError
+from perpetua.pipeline.store import write_json
+
+WORK_FOLDER = ".work"
+RUN_FILE = "run.json"
+LOG_FILE = "log.jsonl"
+
+
+def sequence_name(seed: int, room: int) -> str:
+    """Name of a sequence; it does not depend on how many rooms are made."""
+    return f"seed{seed}-room{room:04d}"
+
+
+@dataclass(frozen=True)
+class OutputLayout:
+    """The folders of one room below the output folder."""
+
+    out: Path
+    split: str
+    seed: int
+    room: int
+
+    @property
+    def work_folder(self) -> Path:
+        """Where the room's stages are kept."""
+        return self.out / WORK_FOLDER / sequence_name(self.seed, self.room)
+
+    @property
+    def sequence_folder(self) -> Path:
+        """Where the finished sequence appears."""
+        return self.out / self.split / sequence_name(self.seed, self.room)
+
+    @property
+    def failure_file(self) -> Path:
+        """Why the last attempt at the room failed, if it did."""
+        return self.work_folder / "failure.json"
+
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Keeps two runs on this machine from working on one room at once; the system frees it if we die."""
+        self.work_folder.mkdir(parents=True, exist_ok=True)
+        with (self.work_folder / ".lock").open("w") as handle:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise PerpetuaError(
+                    f"another run is working on room {self.room} in '{self.out}': wait for it, or choose another --out"
+                ) from None
+            yield
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """What was asked for in an output folder, kept in run.json."""
+
+    seed: int
+    rooms: tuple[int, ...]
+    config: Config
+
+
+def read_run(out: Path) -> RunRecord:
+    """The record of an output folder.
+
+    Raises:
+        InputError: the folder holds no run.
+    """
+    path = out / RUN_FILE
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return RunRecord(
+            int(content["seed"]),
+            tuple(int(room) for room in content["rooms"]),
+            Config.model_validate(content["config"]),
+        )
+    except OSError:
+        raise InputError(f"'{out}' holds no run of perpetua (no {RUN_FILE}): give the --out of a generate") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"'{path}' cannot be read: {error}") from None
+
+
+def open_run(out: Path, seed: int, rooms: range, config: Config, replace: bool) -> RunRecord:
+    """Records the rooms asked for; an output folder keeps one seed and one config, so nothing is overwritten.
+
+    Raises:
+        InputError: the folder was made with another seed or config and ``replace`` is false, or is not writable.
+    """
+    wanted = set(rooms)
+    if (out / RUN_FILE).exists() and not replace:
+        before = read_run(out)
+        differences = _differences(before, seed, config)
+        if differences:
+            raise InputError(
+                f"'{out}' was made with other settings ({differences}): choose another --out, or pass --replace to "
+                "make its sequences anew"
+            )
+        wanted |= set(before.rooms)
+    record = RunRecord(seed, tuple(sorted(wanted)), config)
+    try:
+        write_json(
+            out / RUN_FILE, {"seed": seed, "rooms": list(record.rooms), "config": config.model_dump(mode="json")}
+        )
+    except OSError as error:
+        raise InputError(f"cannot write to --out '{out}': {error}") from None
+    return record
+
+
+def _differences(before: RunRecord, seed: int, config: Config) -> str:
+    found = [f"--seed {before.seed}, now {seed}"] if before.seed != seed else []
+    old, new = _flat(before.config.model_dump(mode="json")), _flat(config.model_dump(mode="json"))
+    found += [f"{key} {old.get(key)}, now {new[key]}" for key in new if old.get(key) != new[key]]
+    return "; ".join(found[:4]) + ("; ..." if len(found) > 4 else "")
+
+
+def _flat(tree: dict[str, object], prefix: str = "") -> dict[str, object]:
+    flat: dict[str, object] = {}
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f"{prefix}{key}.")
+        else:
+            flat[prefix + key] = value
+    return flat

@@ -1,0 +1,43 @@
+"""Peak memory of this process and everything it starts."""
+
+import threading
+from types import TracebackType
+
+import psutil
+
+
+class PeakMemory:
+    """Context manager that samples the resident memory of the process tree; ``peak_mb`` afterwards."""
+
+    def __init__(self, interval_s: float = 0.2) -> None:
+        self.peak_mb = 0.0
+        self._interval_s = interval_s
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+
+    def __enter__(self) -> "PeakMemory":
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._done.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        root = psutil.Process()
+        while True:
+            self.peak_mb = max(self.peak_mb, _tree_memory_mb(root))
+            if self._done.wait(self._interval_s):
+                return
+
+
+def _tree_memory_mb(root: psutil.Process) -> float:
+    total = 0
+    for process in (root, *root.children(recursive=True)):
+        try:
+            total += process.memory_info().rss
+        except psutil.Error:
+            continue
+    return total / 1e6

@@ -1,0 +1,233 @@
+"""The stage table: what runs, in which order, from which settings. Reading it top to bottom is the pipeline."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from perpetua.actors.assembly import assemble_actors, draw_bodies
+from perpetua.actors.bodies.source import Body
+from perpetua.actors.motion.plan import make_motions
+from perpetua.actors.routes import plan_routes
+from perpetua.actors.types import ActorMesh, BodyMotion, Route
+from perpetua.actors.validation import validate_actors
+from perpetua.audit.verify import verify_sequence
+from perpetua.cameras.plan import plan_cameras
+from perpetua.cameras.types import CameraPath
+from perpetua.config import Config
+from perpetua.errors import AuditError
+from perpetua.formats import EXPORTERS
+from perpetua.navigation.grid import build_nav_grid
+from perpetua.navigation.types import NavGrid
+from perpetua.pipeline.record import sequence_record
+from perpetua.pipeline.store import write_json
+from perpetua.rendering.blender import SCRIPT_FOLDER
+from perpetua.rendering.render import render_views
+from perpetua.rendering.types import RenderedView
+from perpetua.rooms.source import build_room
+from perpetua.rooms.types import Room
+from perpetua.seeding import StageSeed
+
+from perpetua.tracks.make import make_tracks
+from perpetua.tracks.types import SequenceTracks
+
+Value = TypeVar("Value")
+
+# Where the export stage writes the sequence inside its folder, until it is published.
+SEQUENCE_FOLDER = "sequence"
+AUDIT_FILE = "audit.json"
+
+
+@dataclass(frozen=True)
+class StageContext:
+    """What a stage's function may use.
+
+    ``folder`` takes the stage's files; ``upstream`` loads an earlier stage's value; ``on_frame`` reports rendered
+    frames (done, total, seconds of the last one).
+    """
+
+    config: Config
+    seed: StageSeed
+    folder: Path
+    device: str
+    stage_folders: Mapping[str, Path]
+    upstream: Callable[[str], Any]
+    on_frame: Callable[[int, int, float], None]
+
+    def one(self, stage: str, kind: type[Value]) -> Value:
+        """The value of an earlier stage."""
+        value = self.upstream(stage)
+        if not isinstance(value, kind):
+            raise TypeError(f"stage {stage} gave {type(value).__name__}, not {kind.__name__}")
+        return value
+
+    def many(self, stage: str, kind: type[Value]) -> tuple[Value, ...]:
+        """The values of an earlier stage that makes several."""
+        values = self.one(stage, tuple)
+        if not all(isinstance(value, kind) for value in values):
+            raise TypeError(f"stage {stage} gave something other than {kind.__name__}")
+        return values
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One row of the table. ``section`` names the settings that the key depends on; ``version`` counts changes."""
+
+    number: int
+    name: str
+    version: int
+    needs: tuple[str, ...]
+    section: Callable[[Config], dict[str, Any]]
+    run: Callable[[StageContext], object]
+    scripts: tuple[str, ...] = ()
+    resumable: bool = False
+
+
+def _settings(*names: str) -> Callable[[Config], dict[str, Any]]:
+    """The named settings, ``a`` for a section or ``a.b`` for a value."""
+
+    def pick(config: Config) -> dict[str, Any]:
+        picked: dict[str, Any] = {}
+        for name in names:
+            value: Any = config.model_dump(mode="json")
+            for part in name.split("."):
+                value = value[part]
+            picked[name] = value
+        return picked
+
+    return pick
+
+
+def _room(context: StageContext) -> Room:
+    return build_room(context.config.rooms, context.config.navigation, context.seed, context.folder)
+
+
+def _navigation(context: StageContext) -> NavGrid:
+    return build_nav_grid(context.one("room", Room), context.config.navigation)
+
+
+def _routes(context: StageContext) -> tuple[Route, ...]:
+    sequence = context.config.sequence
+    room, grid = context.one("room", Room), context.one("navigation", NavGrid)
+    return plan_routes(room, grid, context.config.actors, sequence.frames, sequence.fps, context.seed)
+
+
+def _bodies(context: StageContext) -> tuple[Body, ...]:
+    """Motion and actors draw the same bodies, so both draw them from one stream of its own."""
+    return draw_bodies(context.config.actors, StageSeed(context.seed.seed, context.seed.room, "bodies"))
+
+
+def _motion(context: StageContext) -> tuple[BodyMotion, ...]:
+    skeletons = tuple(body.skeleton for body in _bodies(context))
+    routes = context.many("routes", Route)
+    return make_motions(routes, skeletons, context.config.sequence.fps, context.config.actors.motion, context.seed)
+
+
+def _actors(context: StageContext) -> tuple[ActorMesh, ...]:
+    bodies, motions, room = _bodies(context), context.many("motion", BodyMotion), context.one("room", Room)
+    actors = assemble_actors(bodies, motions, room.next_object_index)
+    report = validate_actors(
+        actors,
+        motions,
+        tuple(body.skeleton for body in bodies),
+        context.many("routes", Route),
+        room,
+        context.config.sequence.fps,
+        context.config.actors.validation,
+    )
+    write_json(context.folder / "validation.json", report.to_json())
+    return actors
+
+
+def _cameras(context: StageContext) -> tuple[CameraPath, ...]:
+    config = context.config
+    return plan_cameras(
+        context.one("room", Room),
+        context.many("actors", ActorMesh),
+        config.cameras,
+        config.sequence.frames,
+        config.sequence.fps,
+        config.render.width_px,
+        config.render.height_px,
+        context.seed,
+    )
+
+
+def _render(context: StageContext) -> tuple[RenderedView, ...]:
+    return render_views(
+        context.one("room", Room),
+        context.many("actors", ActorMesh),
+        context.many("cameras", CameraPath),
+        context.config.render,
+        context.device,
+        context.folder,
+        context.on_frame,
+    )
+
+
+def _tracks(context: StageContext) -> SequenceTracks:
+    return make_tracks(
+        context.one("room", Room),
+        context.many("actors", ActorMesh),
+        context.many("cameras", CameraPath),
+        context.many("render", RenderedView),
+        context.config.tracks,
+        context.seed,
+    )
+
+
+def _export(context: StageContext) -> None:
+    room, actors = context.one("room", Room), context.many("actors", ActorMesh)
+    EXPORTERS["tapvid_mv"]().write(
+        context.folder / SEQUENCE_FOLDER,
+        room,
+        actors,
+        context.many("cameras", CameraPath),
+        context.many("render", RenderedView),
+        context.one("tracks", SequenceTracks),
+        sequence_record(context.config, context.seed, room, actors),
+    )
+
+
+def _audit(context: StageContext) -> None:
+    report = verify_sequence(context.stage_folders["export"] / SEQUENCE_FOLDER, context.config.audit)
+    write_json(context.folder / AUDIT_FILE, report.to_json())
+    if not report.passed:
+        failures = "; ".join(str(check) for check in report.checks if not check.passed)
+        raise AuditError(f"the finished sequence does not pass its audit: {failures}")
+
+
+_FRAMES = "sequence.frames"
+_FPS = "sequence.fps"
+
+STAGES = (
+    Stage(10, "room", 1, (), _settings("rooms", "navigation"), _room, scripts=("infinigen_room.py",)),
+    Stage(20, "navigation", 1, ("room",), _settings("navigation"), _navigation),
+    Stage(30, "routes", 1, ("room", "navigation"), _settings("actors.count", "actors.routes", _FRAMES, _FPS), _routes),
+    Stage(40, "motion", 1, ("routes",), _settings("actors", _FPS), _motion),
+    Stage(50, "actors", 1, ("room", "routes", "motion"), _settings("actors", _FPS), _actors),
+    Stage(
+        60,
+        "cameras",
+        1,
+        ("room", "actors"),
+        _settings("cameras", _FRAMES, _FPS, "render.width_px", "render.height_px"),
+        _cameras,
+    ),
+    Stage(
+        70,
+        "render",
+        1,
+        ("room", "actors", "cameras"),
+        _settings("render"),
+        _render,
+        scripts=tuple(sorted(p.name for p in SCRIPT_FOLDER.glob("*.py") if p.name != "infinigen_room.py")),
+        resumable=True,
+    ),
+    Stage(80, "tracks", 1, ("room", "actors", "cameras", "render"), _settings("tracks"), _tracks),
+    Stage(
+        90, "export", 1, ("room", "actors", "cameras", "render", "tracks"), lambda c: c.model_dump(mode="json"), _export
+    ),
+    Stage(95, "audit", 1, ("export",), _settings("audit"), _audit),
+)
+STAGE_NAMES = tuple(stage.name for stage in STAGES)
