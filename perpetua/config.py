@@ -117,6 +117,33 @@ def field_table(section: type[Section] = Config, prefix: str = "") -> dict[str, 
     return table
 
 
+def annotated_yaml(config: Config) -> str:
+    """Every setting as YAML, each with its meaning and range as a comment."""
+    return "\n".join(_annotated_lines(config, ""))
+
+
+def _annotated_lines(section: Section, indent: str) -> list[str]:
+    lines: list[str] = []
+    for name, field in type(section).model_fields.items():
+        value = getattr(section, name)
+        if isinstance(value, Section):
+            lines += [f"{indent}{name}:", *_annotated_lines(value, indent + "  ")]
+        else:
+            limits = ", ".join(_limit(rule) for rule in field.metadata)
+            text = yaml.safe_dump(section.model_dump(mode="json")[name], default_flow_style=True).split("\n")[0]
+            lines.append(f"{indent}{name}: {text}  # {field.description}" + (f" [{limits}]" if limits else ""))
+    return lines
+
+
+def _limit(rule: object) -> str:
+    """One bound of a field as people write it."""
+    signs = {"Ge": ">=", "Gt": ">", "Le": "<=", "Lt": "<"}
+    name = type(rule).__name__
+    if name in signs:
+        return f"{signs[name]} {getattr(rule, name.lower())}"
+    return str(rule)
+
+
 def _nearest(name: str, known: Mapping[str, Any]) -> str:
     near = difflib.get_close_matches(name, list(known), n=1)
     return f"; did you mean '{near[0]}'?" if near else ""

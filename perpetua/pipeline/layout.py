@@ -41,6 +41,11 @@ class OutputLayout:
         return self.out / self.split / sequence_name(self.seed, self.room)
 
     @property
+    def contact_sheet(self) -> Path:
+        """The picture of the finished sequence."""
+        return self.out / "previews" / f"{sequence_name(self.seed, self.room)}.png"
+
+    @property
     def failure_file(self) -> Path:
         """Why the last attempt at the room failed, if it did."""
         return self.work_folder / "failure.json"

@@ -27,7 +27,6 @@ from perpetua.rendering.types import RenderedView
 from perpetua.rooms.source import build_room
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
-
 from perpetua.tracks.make import make_tracks
 from perpetua.tracks.types import SequenceTracks
 

@@ -1,0 +1,60 @@
+"""Outside assets: what each is, under which licence, where it goes, and what it costs to lack it."""
+
+import importlib.util
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from perpetua.errors import AssetError
+
+MANIFEST_FOLDER = Path(__file__).parent.parent / "assets_manifest"
+ASSET_FOLDER_VARIABLE = "PERPETUA_ASSETS"
+
+
+def asset_folder() -> Path:
+    """Where a user's assets lie: ``$PERPETUA_ASSETS``, else ``~/.local/share/perpetua/assets``."""
+    chosen = os.environ.get(ASSET_FOLDER_VARIABLE)
+    return Path(chosen) if chosen else Path.home() / ".local" / "share" / "perpetua" / "assets"
+
+
+@dataclass(frozen=True)
+class Asset:
+    """One entry of the manifest. An asset is a Python ``package`` or ``files`` below the asset folder."""
+
+    name: str
+    what: str
+    licence: str
+    origin: str
+    without_it: str
+    config_key: str = ""
+    package: str = ""
+    files: tuple[str, ...] = ()
+    sha256: tuple[str, ...] = ()
+
+    def find(self) -> Path | None:
+        """Where the asset is, or None."""
+        if self.package:
+            spec = importlib.util.find_spec(self.package)
+            return Path(spec.origin).parent if spec is not None and spec.origin is not None else None
+        places = [asset_folder() / name for name in self.files]
+        return places[0] if places and all(place.exists() for place in places) else None
+
+
+def load_manifest(folder: Path = MANIFEST_FOLDER) -> list[Asset]:
+    """All entries, by file name.
+
+    Raises:
+        AssetError: an entry is not valid.
+    """
+    return [_read_entry(path) for path in sorted(folder.glob("*.yaml"))]
+
+
+def _read_entry(path: Path) -> Asset:
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        lists = {key: tuple(content.pop(key, ())) for key in ("files", "sha256")}
+        return Asset(**content, **lists)
+    except (OSError, yaml.YAMLError, TypeError, AttributeError, ValueError) as error:
+        raise AssetError(f"asset manifest '{path}' is not valid: {error}") from None

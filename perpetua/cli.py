@@ -1,0 +1,185 @@
+"""The command line: parse, call the pipeline, report; decide nothing."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+import perpetua
+from perpetua.config import Config, load_config, presets
+from perpetua.errors import PerpetuaError
+
+DEVICES = ("auto", "cpu", "cuda", "optix", "hip", "metal", "oneapi")
+OUT_OPTION = click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True,
+    help="Output folder.",
+)  # fmt: skip
+
+
+class PerpetuaGroup(click.Group):
+    """Turns errors meant for the user into a message and their exit code."""
+
+    def invoke(self, context: click.Context) -> Any:
+        try:
+            return super().invoke(context)
+        except PerpetuaError as error:
+            click.echo(f"perpetua: {error}", err=True)
+            context.exit(error.exit_code)
+
+
+@click.group(cls=PerpetuaGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(perpetua.__version__, prog_name="perpetua")
+def main() -> None:
+    """Procedural multi-view indoor video with exact 3D ground truth.
+
+    Try: perpetua generate --preset quick --seed 7 --rooms 1
+    """
+
+
+@main.command()
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Decides everything drawn.")
+@click.option("--rooms", type=click.IntRange(min=1), default=1, show_default=True, help="How many sequences to make.")
+@click.option("--start-room", type=click.IntRange(min=0), default=0, show_default=True, help="Index of the first room.")
+@click.option("--until", metavar="STAGE", help="Stop after this stage, for example 'cameras'.")
+@OUT_OPTION
+@click.option("--config", "config_path", type=click.Path(path_type=Path), help="A YAML file with settings.")
+@click.option("--preset", metavar="NAME", default="standard", show_default=True,
+              help="Settings to start from: tiny, quick, standard or benchmark.")  # fmt: skip
+@click.option("--set", "assignments", metavar="KEY=VALUE", multiple=True,
+              help="Change one setting, for example --set sequence.frames=48. Can be given several times.")  # fmt: skip
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Rooms made at a time.")
+@click.option("--device", type=click.Choice(DEVICES), default="auto", show_default=True, help="What Cycles renders on.")
+@click.option("--replace", is_flag=True, help="Allow other settings than the ones the output folder was made with.")
+@click.option("--dry-run", is_flag=True, help="Say what would be done and what it costs, and do nothing.")
+def generate(
+    seed: int,
+    rooms: int,
+    start_room: int,
+    until: str | None,
+    out: Path,
+    config_path: Path | None,
+    preset: str,
+    assignments: tuple[str, ...],
+    workers: int,
+    device: str,
+    replace: bool,
+    dry_run: bool,
+) -> None:
+    """Make sequences: rooms, actors, cameras, video, tracks.
+
+    Stopped at any moment, the same command goes on where it was. Room k of a seed is the same however many rooms
+    are made, in whichever order.
+    """
+    from perpetua.pipeline.generate import GenerateRequest, run_generate
+
+    request = GenerateRequest(
+        config=load_config(preset, config_path, assignments),
+        seed=seed,
+        rooms=range(start_room, start_room + rooms),
+        until=until,
+        out=out,
+        workers=workers,
+        device=device,
+        replace=replace,
+    )
+    sys.exit(run_generate(request, Console(), dry_run))
+
+
+@main.command()
+@OUT_OPTION
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def status(out: Path, as_json: bool) -> None:
+    """Rooms and stages of an output folder: done, failed with its reason, time left."""
+    from perpetua.pipeline.status import read_status, status_table
+
+    report = read_status(out)
+    if as_json:
+        click.echo(json.dumps(report.to_json(), indent=1))
+    else:
+        Console().print(status_table(report))
+        for line in report.notes():
+            click.echo(line)
+
+
+@main.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def verify(folders: tuple[Path, ...], as_json: bool) -> None:
+    """Check finished sequences: layout, projection, depth, visibility, queries.
+
+    FOLDERS are sequence folders, or folders that hold some. Exit code 1 if a check fails.
+    """
+    from perpetua.audit.verify import find_sequences, verify_sequence
+
+    bounds = Config().audit
+    reports = [verify_sequence(folder, bounds) for given in folders for folder in find_sequences(given)]
+    if as_json:
+        click.echo(json.dumps([report.to_json() for report in reports], indent=1))
+    else:
+        for report in reports:
+            Console().print(report.table())
+    sys.exit(0 if all(report.passed for report in reports) else 1)
+
+
+@main.command()
+@click.argument("sequence", type=click.Path(path_type=Path))
+@click.option("--out", "png", type=click.Path(path_type=Path, dir_okay=False), help="PNG to write.")
+@click.option("--times", type=click.IntRange(1, 24), default=6, show_default=True, help="Frames shown.")
+def preview(sequence: Path, png: Path | None, times: int) -> None:
+    """Draw a contact sheet of a sequence: views by times, tracks with fading tails, depth, actors."""
+    from perpetua.audit.contact_sheet import write_contact_sheet
+
+    target = png if png is not None else sequence / "contact_sheet.png"
+    write_contact_sheet(sequence, target, times)
+    click.echo(f"wrote {target}")
+
+
+@main.command()
+def assets() -> None:
+    """List outside assets: present or missing, licence, and what is lost without them."""
+    from perpetua.assets import asset_folder, load_manifest
+
+    table = Table("asset", "state", "what", "licence", "without it")
+    for asset in load_manifest():
+        present = asset.find() is not None
+        table.add_row(asset.name, "present" if present else "missing", asset.what, asset.licence, asset.without_it)
+    Console().print(table)
+    click.echo(f"files are looked for in {asset_folder()} (set PERPETUA_ASSETS to change it)")
+
+
+@main.command()
+@OUT_OPTION
+def doctor(out: Path) -> None:
+    """Check this machine and say what to install. Exit code 1 if something needed is missing."""
+    from perpetua.doctor import examine
+
+    findings = examine(out)
+    table = Table("what", "state", "found", "what to do")
+    for finding in findings:
+        table.add_row(finding.subject, finding.state, finding.value, finding.remedy)
+    Console().print(table)
+    sys.exit(1 if any(finding.state == "missing" for finding in findings) else 0)
+
+
+@main.command()
+@OUT_OPTION
+@click.option("--all", "unfinished", is_flag=True, help="Also the work of rooms that are not finished.")
+def clean(out: Path, unfinished: bool) -> None:
+    """Free the work area of finished rooms. Sequences stay."""
+    from perpetua.pipeline.cost import gigabytes
+    from perpetua.pipeline.status import clean_work_area
+
+    click.echo(f"freed {gigabytes(clean_work_area(out, unfinished))}")
+
+
+@main.command("config")
+@click.option("--preset", default="standard", show_default=True, help=f"One of {', '.join(presets())}.")
+def show_config(preset: str) -> None:
+    """Print every setting of a preset with its meaning, as YAML."""
+    from perpetua.config import annotated_yaml
+
+    click.echo(annotated_yaml(load_config(preset)))

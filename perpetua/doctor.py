@@ -1,0 +1,133 @@
+"""Checks of the machine: Python, the system libraries bpy links, packages, disk, devices, optional assets."""
+
+import ctypes
+import importlib.metadata
+import platform
+import shutil
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from perpetua.assets import load_manifest
+from perpetua.errors import EnvironmentSetupError
+
+# The libraries that bpy 4.2 links and its wheel does not bring: file -> Debian and Ubuntu package.
+SYSTEM_LIBRARIES = {
+    "libGL.so.1": "libgl1",
+    "libXi.so.6": "libxi6",
+    "libXrender.so.1": "libxrender1",
+    "libXxf86vm.so.1": "libxxf86vm1",
+    "libXfixes.so.3": "libxfixes3",
+    "libxkbcommon.so.0": "libxkbcommon0",
+    "libSM.so.6": "libsm6",
+    "libICE.so.6": "libice6",
+    "libgomp.so.1": "libgomp1",
+}
+NEEDED_PACKAGES = ("bpy", "numpy", "scipy", "torch", "trimesh", "anny", "opencv-python-headless", "OpenEXR")
+WANTED_DISK_GB = 5.0
+
+State = Literal["ok", "missing", "optional"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at; ``remedy`` says what to do when it is missing."""
+
+    subject: str
+    state: State
+    value: str
+    remedy: str = ""
+
+
+def examine(out: Path) -> list[Finding]:
+    """Looks at everything; nothing is changed."""
+    return [*_python(), *_libraries(), *_packages(), *_disk(out), *_devices(), *_assets()]
+
+
+def missing_libraries() -> list[str]:
+    """Debian names of the system libraries that bpy needs and the loader does not find."""
+    if platform.system() != "Linux":
+        return []
+    return [package for library, package in SYSTEM_LIBRARIES.items() if not _loads(library)]
+
+
+def require_libraries() -> None:
+    """Raises EnvironmentSetupError with the command to run if a system library of bpy is missing."""
+    missing = missing_libraries()
+    if missing:
+        raise EnvironmentSetupError(
+            f"Blender needs system libraries that are not installed: {', '.join(missing)}; on Debian or Ubuntu run: "
+            f"sudo apt-get install -y {' '.join(missing)}"
+        )
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+def _python() -> Iterator[Finding]:
+    version = platform.python_version()
+    fits = sys.version_info[:2] == (3, 11)
+    remedy = "" if fits else "use Python 3.11: bpy 4.2.0, which Infinigen 2 needs, exists for no other"
+    yield Finding("Python", "ok" if fits else "missing", version, remedy)
+
+
+def _libraries() -> Iterator[Finding]:
+    missing = missing_libraries()
+    if missing:
+        yield Finding("system libraries", "missing", ", ".join(missing), f"sudo apt-get install -y {' '.join(missing)}")
+    else:
+        yield Finding("system libraries", "ok", "all that bpy links")
+
+
+def _packages() -> Iterator[Finding]:
+    for name in NEEDED_PACKAGES:
+        version = _version(name)
+        yield Finding(name, "ok" if version else "missing", version or "not installed", "" if version else "./setup.sh")
+    infinigen = _version("infinigen")
+    yield Finding(
+        "infinigen",
+        "ok" if infinigen else "optional",
+        infinigen or "not installed",
+        "" if infinigen else "./setup.sh, or set rooms.source to procedural",
+    )
+
+
+def _version(package: str) -> str | None:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _disk(out: Path) -> Iterator[Finding]:
+    place = out.absolute()
+    while not place.exists():
+        place = place.parent
+    free_gb = shutil.disk_usage(place).free / 1e9
+    enough = free_gb >= WANTED_DISK_GB
+    remedy = "" if enough else f"free some: a standard sequence takes up to {WANTED_DISK_GB:.0f} GB while it is made"
+    yield Finding(f"free disk at {place}", "ok" if enough else "missing", f"{free_gb:.0f} GB", remedy)
+
+
+def _devices() -> Iterator[Finding]:
+    import torch
+
+    if torch.cuda.is_available():
+        yield Finding("GPU", "ok", torch.cuda.get_device_name(0))
+    else:
+        yield Finding("GPU", "optional", "none found", "rendering uses the CPU")
+
+
+def _assets() -> Iterator[Finding]:
+    for asset in load_manifest():
+        if asset.find() is None:
+            yield Finding(asset.name, "optional", "not present", asset.without_it)
+        else:
+            yield Finding(asset.name, "ok", str(asset.find()))

@@ -1,0 +1,126 @@
+"""``perpetua generate``: says what it will cost, makes the rooms, and says what came out and how to go on."""
+
+import difflib
+import logging
+import shlex
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from rich.console import Console
+
+from perpetua.audit.contact_sheet import write_contact_sheet
+from perpetua.cluster.local import raise_on_sigterm, run_rooms
+from perpetua.config import Config
+from perpetua.doctor import require_libraries
+from perpetua.errors import ConfigError
+from perpetua.pipeline.cost import Cost, check_disk, estimate_cost, gigabytes
+from perpetua.pipeline.events import OnEvent
+from perpetua.pipeline.layout import LOG_FILE, OutputLayout, open_run
+from perpetua.pipeline.progress import Progress
+from perpetua.pipeline.runner import RoomRun
+from perpetua.pipeline.stages import STAGE_NAMES, STAGES
+
+EXIT_INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class GenerateRequest:
+    """What the user asked for."""
+
+    config: Config
+    seed: int
+    rooms: range
+    until: str | None
+    out: Path
+    workers: int
+    device: str
+    replace: bool
+
+
+def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> int:
+    """Makes the sequences asked for.
+
+    Returns:
+        0 if every room came out, 1 if some failed, 130 if it was stopped.
+
+    Raises:
+        InputError: the request cannot be carried out as it stands.
+    """
+    until = _checked_stage(request.until)
+    require_libraries()
+    cost = estimate_cost(request.config, len(request.rooms))
+    free_bytes = check_disk(cost, request.out)
+    _say_cost(request, cost, free_bytes, until, console)
+    if dry_run:
+        return 0
+    open_run(request.out, request.seed, request.rooms, request.config, request.replace)
+    job = partial(make_room, request, until)
+    logging.getLogger("perpetua").setLevel(logging.INFO)
+    raise_on_sigterm()
+    try:
+        with Progress(request.out / LOG_FILE, len(request.rooms), request.config.cameras.count, console) as progress:
+            failures = run_rooms(request.rooms, request.workers, job, progress.show)
+    except KeyboardInterrupt:
+        console.print(f"stopped; what is done is kept. To go on, run the same command again:\n  {_this_command()}")
+        return EXIT_INTERRUPTED
+    _say_result(request, failures, until, console)
+    return 1 if failures else 0
+
+
+def make_room(request: GenerateRequest, until: str, room: int, on_event: OnEvent) -> None:
+    """One room through the stages, and its contact sheet."""
+    RoomRun(request.config, request.seed, room, request.out, request.device, on_event).run(until)
+    if until == STAGES[-1].name:
+        layout = OutputLayout(request.out, request.config.export.split, request.seed, room)
+        if not layout.contact_sheet.exists():
+            layout.contact_sheet.parent.mkdir(parents=True, exist_ok=True)
+            write_contact_sheet(layout.sequence_folder, layout.contact_sheet)
+
+
+def _checked_stage(until: str | None) -> str:
+    if until is None:
+        return STAGE_NAMES[-1]
+    if until not in STAGE_NAMES:
+        near = difflib.get_close_matches(until, STAGE_NAMES, n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else ""
+        raise ConfigError(f"--until must be one of {', '.join(STAGE_NAMES)}, not '{until}'{hint}")
+    return until
+
+
+def _say_cost(request: GenerateRequest, cost: Cost, free_bytes: float, until: str, console: Console) -> None:
+    say: Callable[[str], None] = partial(console.print, highlight=False, soft_wrap=True)
+    render = request.config.render
+    say(f"{cost.rooms} room(s) of seed {request.seed}, first {request.rooms.start}, through stage '{until}'")
+    say(
+        f"each: {cost.frames} frames x {request.config.cameras.count} views = {cost.images} images of "
+        f"{render.width_px} x {render.height_px} px at {render.samples} samples; the time is estimated after the "
+        "first frame"
+    )
+    say(
+        f"disk: about {gigabytes(cost.sequence_bytes)} per sequence and {gigabytes(cost.work_bytes)} of work area, "
+        f"{gigabytes(cost.total_bytes)} in all; {gigabytes(free_bytes)} free"
+    )
+    if free_bytes < cost.total_bytes:
+        say("warning: not all of it fits; run `perpetua clean` as rooms finish, or choose another --out")
+    say(f"writes to: {request.out.absolute()}")
+
+
+def _say_result(request: GenerateRequest, failures: dict[int, str], until: str, console: Console) -> None:
+    say: Callable[[str], None] = partial(console.print, highlight=False, soft_wrap=True)
+    for room in request.rooms:
+        layout = OutputLayout(request.out, request.config.export.split, request.seed, room)
+        if room in failures:
+            say(f"room {room} failed: {failures[room]}")
+        elif until == STAGE_NAMES[-1]:
+            say(f"room {room}: {layout.sequence_folder}\n  look at {layout.contact_sheet}")
+        else:
+            say(f"room {room}: done through '{until}' in {layout.work_folder}")
+    if failures:
+        say(f"{len(failures)} of {len(request.rooms)} rooms failed; to try them again:\n  {_this_command()}")
+
+
+def _this_command() -> str:
+    return shlex.join(["perpetua", *sys.argv[1:]])
