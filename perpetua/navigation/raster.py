@@ -1,0 +1,104 @@
+"""Triangles and polygons on a regular grid, never missing a cell that they touch."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Float64, Int64
+
+CHUNK_TRIANGLES = 200_000
+
+
+@dataclass(frozen=True)
+class Raster:
+    """A grid of square cells; cell (i, j) has its centre at ``origin_m + cell_m * (i, j)``."""
+
+    origin_m: Float64[np.ndarray, "2"]
+    cell_m: float
+    shape: tuple[int, int]
+
+    def centres_m(self) -> Float64[np.ndarray, "X Y 2"]:
+        """The x and y of every cell's centre."""
+        indices = np.stack(np.meshgrid(*map(np.arange, self.shape), indexing="ij"), axis=-1)
+        return np.asarray(self.origin_m + self.cell_m * indices)
+
+
+@dataclass(frozen=True)
+class Touches:
+    """Cells touched by parts of surfaces, as flat indices of a raster, and the heights those parts span."""
+
+    cell: Int64[np.ndarray, " N"]
+    low_z_m: Float32[np.ndarray, " N"]
+    high_z_m: Float32[np.ndarray, " N"]
+
+
+def touched_cells(
+    raster: Raster, corners_m: Float[np.ndarray, "F 3 3"], low_z_m: float, high_z_m: float
+) -> Iterator[Touches]:
+    """The cells that triangles touch between two heights, in chunks.
+
+    Triangles are halved across their longest side (seen from above) until none is wider than a cell, and each piece
+    claims every cell of its bounding rectangle. So no touched cell is missed, however thin the triangle, and none is
+    claimed that is further than one cell away.
+
+    Args:
+        raster: the grid; what lies outside it is left out.
+        corners_m: triangle corners in the world.
+        low_z_m: pieces entirely below are left out.
+        high_z_m: pieces entirely above are left out.
+    """
+    for start in range(0, len(corners_m), CHUNK_TRIANGLES):
+        waiting = corners_m[start : start + CHUNK_TRIANGLES].astype(np.float32)
+        while True:
+            waiting = waiting[_relevant(raster, waiting, low_z_m, high_z_m)]
+            if not len(waiting):
+                break
+            extent_m = waiting[:, :, :2].max(1) - waiting[:, :, :2].min(1)
+            small = extent_m.max(1) <= raster.cell_m
+            if small.any():
+                yield _claim(raster, waiting[small])
+            waiting = _halve(waiting[~small])
+
+
+def _relevant(
+    raster: Raster, corners_m: Float32[np.ndarray, "F 3 3"], low_z_m: float, high_z_m: float
+) -> Bool[np.ndarray, " F"]:
+    low = np.append(raster.origin_m - 0.5 * raster.cell_m, low_z_m)
+    high = np.append(raster.origin_m + raster.cell_m * (np.array(raster.shape) - 0.5), high_z_m)
+    return np.asarray(((corners_m.max(1) >= low) & (corners_m.min(1) <= high)).all(1))
+
+
+def _halve(corners_m: Float32[np.ndarray, "F 3 3"]) -> Float32[np.ndarray, "G 3 3"]:
+    side_m = np.linalg.norm(np.roll(corners_m, -1, axis=1)[:, :, :2] - corners_m[:, :, :2], axis=2)
+    longest = side_m.argmax(1)
+    rows = np.arange(len(corners_m))
+    start, end, apex = (corners_m[rows, (longest + offset) % 3] for offset in range(3))
+    middle = 0.5 * (start + end)
+    return np.concatenate([np.stack([start, middle, apex], axis=1), np.stack([middle, end, apex], axis=1)])
+
+
+def _claim(raster: Raster, corners_m: Float32[np.ndarray, "F 3 3"]) -> Touches:
+    low, high = corners_m.min(1), corners_m.max(1)
+    first = np.floor((low[:, :2] - raster.origin_m) / raster.cell_m + 0.5).astype(np.int64)
+    last = np.floor((high[:, :2] - raster.origin_m) / raster.cell_m + 0.5).astype(np.int64)
+    limit = np.array(raster.shape) - 1
+    columns = np.stack([first[:, 0], last[:, 0], first[:, 0], last[:, 0]], axis=1)
+    rows = np.stack([first[:, 1], first[:, 1], last[:, 1], last[:, 1]], axis=1)
+    inside = (columns >= 0) & (columns <= limit[0]) & (rows >= 0) & (rows <= limit[1])
+    piece = np.broadcast_to(np.arange(len(corners_m))[:, None], inside.shape)[inside]
+    cell = columns[inside] * raster.shape[1] + rows[inside]
+    return Touches(cell, low[piece, 2], high[piece, 2])
+
+
+def inside_polygon(
+    points_m: Float64[np.ndarray, "*batch 2"], polygon_m: Float64[np.ndarray, "K 2"]
+) -> Bool[np.ndarray, "*batch"]:
+    """Which points lie inside a simple polygon, by the even-odd rule."""
+    x, y = points_m[..., 0], points_m[..., 1]
+    inside = np.zeros(x.shape, bool)
+    for (x0, y0), (x1, y1) in zip(polygon_m, np.roll(polygon_m, -1, axis=0), strict=True):
+        if y0 == y1:
+            continue
+        crossing_x = x0 + (y - y0) * (x1 - x0) / (y1 - y0)
+        inside ^= ((y0 > y) != (y1 > y)) & (x < crossing_x)
+    return inside
