@@ -1,0 +1,156 @@
+"""Runs one of ``blender_scripts/`` as a process of its own: events, time-out, last words, private settings folder."""
+
+import json
+import os
+import selectors
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+from perpetua.errors import AssetError, EnvironmentSetupError, StageError
+
+SCRIPT_FOLDER = Path(__file__).parent.parent.parent / "blender_scripts"
+SYSTEM_LIBRARIES = "libgl1 libxi6 libxrender1 libxxf86vm1 libxfixes3 libxkbcommon0 libsm6 libice6 libgomp1"
+TAIL_LINES = 12
+READ_BYTES = 65536
+
+Event = dict[str, Any]
+
+
+class BlenderError(StageError):
+    """A Blender process crashed, failed or hung. ``reason`` is one clause; ``tail`` its last lines."""
+
+    def __init__(self, reason: str, tail: str) -> None:
+        super().__init__(f"{reason}\n{tail}" if tail else reason)
+        self.reason = reason
+        self.tail = tail
+
+
+def run_script(
+    script: Path,
+    job_path: Path,
+    *,
+    blender: str | None,
+    scratch: Path,
+    silence_timeout_s: float,
+    on_event: Callable[[Event], None],
+    threads: int | None = None,
+) -> None:
+    """Runs a script of Blender on a job until it ends; the process never outlives this call or this process.
+
+    Args:
+        script: a Python script that imports bpy; it gets ``job_path`` as its only argument.
+        job_path: the job file.
+        blender: a Blender program; None runs the script with this Python and the bpy package.
+        scratch: existing folder for the log ``<script>.log`` and Blender's private settings.
+        silence_timeout_s: the process is killed after this long without an event, seconds.
+        on_event: called with each event: a line of JSON on stdout with the key "event".
+        threads: OpenMP and BLAS threads of the process; None leaves them alone.
+
+    Raises:
+        BlenderError: the process ended with an error or by a signal, or was silent for too long.
+        EnvironmentSetupError: a system library that Blender needs is not installed.
+        AssetError: ``blender`` is no program.
+    """
+    log_path = scratch / f"{script.stem}.log"
+    with log_path.open("wb") as log:
+        process = subprocess.Popen(
+            _command(script, job_path, blender),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            env=_environment(scratch, threads),
+            start_new_session=True,
+        )
+        try:
+            assert process.stdout is not None
+            silent = _read_events(process.stdout, silence_timeout_s, on_event)
+            code = 0 if silent else process.wait()
+        finally:
+            _kill_group(process)
+    if silent:
+        raise BlenderError(f"Blender made no progress for {silence_timeout_s:g} s and was stopped", _tail(log_path))
+    if code != 0:
+        raise _explain_exit(code, _tail(log_path))
+
+
+def _command(script: Path, job_path: Path, blender: str | None) -> list[str]:
+    if blender is None:
+        return [sys.executable, str(script), str(job_path)]
+    program = shutil.which(blender)
+    if program is None:
+        raise AssetError(f"render.blender must be a Blender program, not '{blender}': no such program was found")
+    options = ["-b", "--factory-startup", "--disable-autoexec", "--python-exit-code", "1"]
+    return [program, *options, "-P", str(script), "--", str(job_path)]
+
+
+def _environment(scratch: Path, threads: int | None) -> dict[str, str]:
+    """Ours, with a settings folder of Blender's own: none of the user's add-ons, nothing written to their home."""
+    resources = scratch.resolve() / "blender_user"
+    resources.mkdir(exist_ok=True)
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(resources), "PYTHONHASHSEED": "0"}
+    if threads is not None:
+        environment |= {"OMP_NUM_THREADS": str(threads), "OPENBLAS_NUM_THREADS": str(threads)}
+    return environment
+
+
+def _read_events(stdout: IO[bytes], silence_timeout_s: float, on_event: Callable[[Event], None]) -> bool:
+    """Hands on events until stdout is closed; True if none came for too long."""
+    waiting = b""
+    deadline = time.monotonic() + silence_timeout_s
+    with selectors.DefaultSelector() as selector:
+        selector.register(stdout, selectors.EVENT_READ)
+        while True:
+            if not selector.select(max(0.0, deadline - time.monotonic())):
+                return True
+            chunk = os.read(stdout.fileno(), READ_BYTES)
+            if not chunk:
+                return False
+            *lines, waiting = (waiting + chunk).split(b"\n")
+            for event in filter(None, map(_parse_event, lines)):
+                deadline = time.monotonic() + silence_timeout_s
+                on_event(event)
+
+
+def _parse_event(line: bytes) -> Event | None:
+    """An event, or None for anything else that a program prints."""
+    try:
+        event = json.loads(line)
+    except ValueError:
+        return None
+    return event if isinstance(event, dict) and "event" in event else None
+
+
+def _kill_group(process: subprocess.Popen[bytes]) -> None:
+    """Ends the process and all that it started; harmless when they have ended."""
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except (ProcessLookupError, PermissionError):
+        process.kill()
+    process.wait()
+    if process.stdout is not None:
+        process.stdout.close()
+
+
+def _tail(log_path: Path) -> str:
+    text = log_path.read_bytes().decode("utf-8", "replace")
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("Fra:")]
+    return "\n".join(lines[-TAIL_LINES:])
+
+
+def _explain_exit(code: int, tail: str) -> StageError | EnvironmentSetupError:
+    if "cannot open shared object file" in tail:
+        return EnvironmentSetupError(
+            "Blender needs a system library that is not installed; on Debian: apt-get install "
+            f"{SYSTEM_LIBRARIES}\n{tail}"
+        )
+    if code >= 0:
+        return BlenderError(f"Blender ended with exit code {code}", tail)
+    name = signal.Signals(-code).name
+    hint = " (memory ran out, or someone stopped it)" if name == "SIGKILL" else ""
+    return BlenderError(f"Blender was ended by {name}{hint}", tail)

@@ -1,0 +1,193 @@
+"""The render job as files: job.json and one .npy per array, which ``blender_scripts/render_frames.py`` reads.
+
+A file of arrays is named after its content, so job.json alone says whether two jobs are the same.
+"""
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Shaped
+
+from perpetua.actors.types import ActorMesh
+from perpetua.cameras.types import CameraPath
+from perpetua.rendering.blender import SCRIPT_FOLDER
+from perpetua.rendering.config import RenderConfig
+from perpetua.rooms.types import AreaLight, Material, Room, SceneObject
+
+JOB_FILE = "job.json"
+PENDING_FILE = "pending.json"
+EXPOSURE_FILE = "exposure.json"
+FRAME_FOLDER = "frames"
+READ_BYTES = 1 << 22
+# Settings of how the work is done, which do not change what comes out.
+PROCESS_SETTINGS = frozenset({"frame_timeout_s", "max_restarts", "blender", "threads"})
+
+Settings = dict[str, Any]
+
+
+def write_job(
+    folder: Path,
+    room: Room,
+    actors: tuple[ActorMesh, ...],
+    cameras: tuple[CameraPath, ...],
+    config: RenderConfig,
+    device: str,
+) -> Path:
+    """Writes a job into an existing folder; what an earlier, different job left there is removed.
+
+    Returns:
+        The path of job.json.
+    """
+    writer = _ArrayWriter(folder)
+    job: Settings = {
+        "scripts": scripts_sha256(),
+        "frames": len(cameras[0].world_from_camera),
+        "room": _room_settings(room, writer),
+        "actors": [_actor_settings(actor, writer) for actor in actors],
+        "cameras": [_camera_settings(camera, writer) for camera in cameras],
+        "settings": config.model_dump(mode="json", exclude=set(PROCESS_SETTINGS)),
+    }
+    digest = hashlib.sha256(json.dumps(job, sort_keys=True).encode()).hexdigest()
+    path = folder / JOB_FILE
+    if _stored_digest(path) != digest:
+        shutil.rmtree(folder / FRAME_FOLDER, ignore_errors=True)
+        (folder / EXPOSURE_FILE).unlink(missing_ok=True)
+    job |= {"digest": digest, "device": device, "threads": config.threads}
+    write_json(path, job)
+    return path
+
+
+def write_json(path: Path, content: Settings) -> None:
+    """A JSON file that is there in full or not at all."""
+    temporary = path.with_suffix(".tmp")
+    temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    temporary.replace(path)
+
+
+def scripts_sha256() -> str:
+    """SHA-256 over all of Blender's scripts: another script may render another picture."""
+    digest = hashlib.sha256()
+    for path in sorted(SCRIPT_FOLDER.glob("*.py")):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def file_sha256(path: Path) -> str:
+    """SHA-256 of a file of any size."""
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while chunk := stream.read(READ_BYTES):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+class _ArrayWriter:
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._written: set[str] = set()
+
+    def write(self, name: str, values: Shaped[np.ndarray, "*shape"]) -> str:
+        """Writes an array and returns its file's name."""
+        values = np.ascontiguousarray(values)
+        digest = hashlib.sha256(f"{values.dtype.str}{values.shape}".encode())
+        digest.update(values.data)
+        file = f"{name}_{digest.hexdigest()[:24]}.npy"
+        if file not in self._written:
+            temporary = self._folder / "array.tmp"
+            with temporary.open("wb") as stream:
+                np.save(stream, values, allow_pickle=False)
+            temporary.replace(self._folder / file)
+            self._written.add(file)
+        return file
+
+
+def _stored_digest(path: Path) -> str | None:
+    try:
+        return str(json.loads(path.read_text(encoding="utf-8"))["digest"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _room_settings(room: Room, writer: _ArrayWriter) -> Settings:
+    if room.blend_path is not None:
+        path = room.blend_path.resolve()
+        return {"blend_path": str(path), "blend_sha256": file_sha256(path)}
+    return {
+        "blend_path": None,
+        "objects": [_object_settings(thing, writer) for thing in room.objects],
+        "lights": [_light_settings(light) for light in room.lights],
+    }
+
+
+def _object_settings(thing: SceneObject, writer: _ArrayWriter) -> Settings:
+    if thing.material is None:
+        raise ValueError(f"object '{thing.name}' has no material, and the room has no .blend that holds one")
+    return {
+        "name": thing.name,
+        "object_index": thing.object_index,
+        "vertices_m": writer.write("vertices_m", thing.mesh.vertices_m.astype(np.float32)),
+        "faces": writer.write("faces", thing.mesh.faces),
+        "material": _material_settings(thing.material, writer),
+    }
+
+
+def _material_settings(material: Material, writer: _ArrayWriter) -> Settings:
+    return {
+        "name": material.name,
+        "base_color": list(material.base_color),
+        "second_color": list(material.second_color),
+        "roughness": material.roughness,
+        "metallic": material.metallic,
+        "pattern": material.pattern,
+        "scale_m": material.scale_m,
+        "image": None if material.image is None else writer.write("image", material.image),
+        "emission_w_m2": material.emission_w_m2,
+    }
+
+
+def _light_settings(light: AreaLight) -> Settings:
+    return {
+        "position_m": list(light.position_m),
+        "direction": list(light.direction),
+        "size_m": list(light.size_m),
+        "power_w": light.power_w,
+        "color": list(light.color),
+    }
+
+
+def _actor_settings(actor: ActorMesh, writer: _ArrayWriter) -> Settings:
+    parts = [
+        {
+            "name": part.name,
+            "faces": writer.write("faces", part.faces),
+            "uv": writer.write("uv", part.uv),
+            "material": _material_settings(part.material, writer),
+        }
+        for part in actor.parts
+    ]
+    return {
+        "name": f"actor_{actor.actor}",
+        "object_index": actor.object_index,
+        "vertices_m": writer.write("vertices_m", actor.vertices_m),
+        "parts": parts,
+    }
+
+
+def _camera_settings(camera: CameraPath, writer: _ArrayWriter) -> Settings:
+    intrinsics = camera.intrinsics
+    return {
+        "camera": camera.camera,
+        "world_from_camera": writer.write("world_from_camera", camera.world_from_camera),
+        "intrinsics": {
+            "fx_px": float(intrinsics.fx_px),
+            "fy_px": float(intrinsics.fy_px),
+            "cx_px": float(intrinsics.cx_px),
+            "cy_px": float(intrinsics.cy_px),
+            "width_px": int(intrinsics.width_px),
+            "height_px": int(intrinsics.height_px),
+        },
+    }

@@ -1,0 +1,142 @@
+"""The render stage: writes the job, keeps Blender running until every frame is there, reads the frames."""
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+from perpetua.actors.types import ActorMesh
+from perpetua.cameras.types import CameraPath
+from perpetua.errors import RenderError
+from perpetua.rendering.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
+from perpetua.rendering.config import RenderConfig
+from perpetua.rendering.frames import assemble_view, drop_damaged
+from perpetua.rendering.job import FRAME_FOLDER, PENDING_FILE, write_job, write_json
+from perpetua.rendering.types import RenderedView
+from perpetua.rooms.types import Room
+
+logger = logging.getLogger(__name__)
+
+DEVICES = ("auto", "cpu", "cuda", "optix", "hip", "metal", "oneapi")
+RENDER_SCRIPT = SCRIPT_FOLDER / "render_frames.py"
+MAX_OBJECT_INDEX = 65535
+
+
+def render_views(
+    room: Room,
+    actors: tuple[ActorMesh, ...],
+    cameras: tuple[CameraPath, ...],
+    config: RenderConfig,
+    device: str,
+    work_dir: Path,
+    on_frame: Callable[[int, int, float], None],
+    script: Path = RENDER_SCRIPT,
+) -> tuple[RenderedView, ...]:
+    """Renders synchronized RGB, depth and object index of all views.
+
+    Frames that are complete in ``work_dir`` from an earlier, interrupted call with the same arguments are kept;
+    damaged ones are rendered again; another job's are removed.
+
+    Args:
+        room: the room; opened from its .blend if it has one, else built from its objects and lights.
+        actors: posed at every frame of the cameras.
+        cameras: at least one; all with the same number of frames.
+        config: the render section of the config.
+        device: one of ``DEVICES``.
+        work_dir: folder that outlives this call; the returned arrays are mapped from files in it.
+        on_frame: called with (frames done, frames in all, seconds of this frame).
+        script: the worker that Blender runs.
+
+    Returns:
+        One view per camera, in the order of the cameras.
+
+    Raises:
+        RenderError: Blender failed more than ``config.max_restarts`` times, or the job cannot be rendered.
+        EnvironmentSetupError: a system library that Blender needs is not installed.
+    """
+    frame_count = _check_job(room, actors, cameras, device)
+    work_dir.mkdir(parents=True, exist_ok=True)
+    job_path = write_job(work_dir, room, actors, cameras, config, device)
+    _render_pending(job_path, cameras, frame_count, config, on_frame, script)
+    frames = work_dir / FRAME_FOLDER
+    return tuple(assemble_view(frames, camera, frame_count, work_dir) for camera in cameras)
+
+
+def _check_job(room: Room, actors: tuple[ActorMesh, ...], cameras: tuple[CameraPath, ...], device: str) -> int:
+    if device not in DEVICES:
+        raise RenderError(f"the device must be one of {', '.join(DEVICES)}, not '{device}'")
+    if not cameras:
+        raise RenderError("at least one camera is needed to render, not 0: raise cameras.count")
+    frame_count = len(cameras[0].world_from_camera)
+    lengths = {f"camera {camera.camera}": len(camera.world_from_camera) for camera in cameras}
+    lengths |= {f"actor {actor.actor}": len(actor.vertices_m) for actor in actors}
+    for name, length in lengths.items():
+        if length != frame_count:
+            raise RenderError(f"all cameras and actors must have {frame_count} frames; {name} has {length}")
+    taken = [thing.object_index for thing in room.objects] + [actor.object_index for actor in actors]
+    if len(set(taken)) != len(taken) or min(taken) < 1 or max(taken) > MAX_OBJECT_INDEX:
+        raise RenderError(f"object indices must be unique and from 1 to {MAX_OBJECT_INDEX}; these are not: {taken}")
+    return frame_count
+
+
+def _render_pending(
+    job_path: Path,
+    cameras: tuple[CameraPath, ...],
+    frame_count: int,
+    config: RenderConfig,
+    on_frame: Callable[[int, int, float], None],
+    script: Path,
+) -> None:
+    """Starts Blender until no frame is missing, at most ``config.max_restarts`` times more than once."""
+    frames = job_path.parent / FRAME_FOLDER
+    restarts = 0
+    while pending := drop_damaged(frames, cameras, frame_count):
+        write_json(job_path.parent / PENDING_FILE, {"frames": pending})
+        listener = _Listener(frame_count, len(pending), on_frame)
+        try:
+            run_script(
+                script,
+                job_path,
+                blender=config.blender,
+                scratch=job_path.parent,
+                silence_timeout_s=config.frame_timeout_s,
+                on_event=listener,
+            )
+            failure = BlenderError("Blender ended without an error, but frames are missing or damaged", "")
+        except BlenderError as error:
+            failure = error
+        if not (left := drop_damaged(frames, cameras, frame_count)):
+            return
+        if restarts == config.max_restarts:
+            raise _give_up(failure, left[0], frame_count - len(left), frame_count, restarts)
+        restarts += 1
+        logger.warning("%s; restart %d of %d at frame %d", failure.reason, restarts, config.max_restarts, left[0])
+
+
+def _give_up(failure: BlenderError, frame: int, done: int, frame_count: int, restarts: int) -> RenderError:
+    return RenderError(
+        f"rendering stopped at frame {frame} ({done} of {frame_count} frames are done and kept) after {restarts} "
+        f"restarts: {failure.reason}; if memory ran out, lower render.width_px, render.height_px or render.max_texels; "
+        "if a frame takes long, raise render.frame_timeout_s; render.max_restarts allows more tries"
+        + (f"\nBlender's last lines:\n{failure.tail}" if failure.tail else "")
+    )
+
+
+class _Listener:
+    """Turns the worker's events into progress and log lines."""
+
+    def __init__(self, frame_count: int, pending: int, on_frame: Callable[[int, int, float], None]) -> None:
+        self._frame_count = frame_count
+        self._done = frame_count - pending
+        self._on_frame = on_frame
+
+    def __call__(self, event: Event) -> None:
+        match event["event"]:
+            case "device":
+                logger.info("rendering with %s: %s", event["backend"], event["device"])
+                if event["warning"] is not None:
+                    logger.warning("%s", event["warning"])
+            case "ready":
+                logger.info("exposure: %+.2f stops", event["exposure_ev"])
+            case "frame":
+                self._done += 1
+                self._on_frame(self._done, self._frame_count, float(event["seconds"]))
