@@ -48,7 +48,7 @@ def save(value: object, folder: Path) -> None:
     writer = _Writer(folder)
     tree = writer.encode(value)
     if writer.small:
-        np.savez(folder / ARRAY_FILE, allow_pickle=False, **writer.small)
+        np.savez(folder / ARRAY_FILE, **writer.small)
     (folder / VALUE_FILE).write_text(json.dumps(tree, separators=(",", ":")), encoding="utf-8")
 
 
@@ -92,10 +92,11 @@ class _Writer:
         raise TypeError(f"a stage cannot store {type(value).__name__}: add it to STORED_TYPES")
 
     def _array(self, array: np.ndarray) -> str:
-        if isinstance(array, np.memmap) and array.filename is not None:
-            path = Path(array.filename)
-            if path.suffix == ".npy" and path.resolve().is_relative_to(self.folder) and array.base is not None:
-                return self._inside(path)
+        if array.dtype.hasobject:
+            raise TypeError("a stage cannot store an array of Python objects: they would need pickle")
+        kept = self._file_of(array)
+        if kept is not None:
+            return self._inside(kept)
         self.count += 1
         if array.nbytes < OWN_FILE_BYTES:
             key = f"a{self.count}"
@@ -104,6 +105,16 @@ class _Writer:
         name = f"a{self.count}.npy"
         np.save(self.folder / name, np.ascontiguousarray(array), allow_pickle=False)
         return name
+
+    def _file_of(self, array: np.ndarray) -> Path | None:
+        """The .npy in the folder that a memory map shows whole, if it does."""
+        if not isinstance(array, np.memmap) or array.filename is None or not array.flags.c_contiguous:
+            return None
+        path = Path(array.filename)
+        if path.suffix != ".npy" or not path.resolve().is_relative_to(self.folder):
+            return None
+        whole = np.load(path, mmap_mode="r", allow_pickle=False)
+        return path if (whole.shape, whole.dtype) == (array.shape, array.dtype) else None
 
     def _inside(self, path: Path) -> str:
         resolved = path.resolve()
