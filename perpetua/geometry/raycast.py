@@ -1,0 +1,143 @@
+"""Rays and closest distances against triangles: Embree for rays, Warp's bounding volume hierarchy for distances.
+
+Both work in single precision (about 1e-6 of the scene's size); the distance of a ray's hit is computed again in
+double precision from the triangle that was hit.
+"""
+
+import importlib
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any, no_type_check
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32
+
+from perpetua.geometry.mesh import TriMesh
+
+NO_FACE = -1
+
+
+@dataclass(frozen=True)
+class RayHits:
+    """The first triangle on each ray.
+
+    ``distance_m`` is the length along the ray (infinite where nothing is hit), ``face`` the triangle's index
+    (-1: nothing), ``barycentric`` the weights of its three corners (zeros where nothing is hit).
+    """
+
+    distance_m: Float64[np.ndarray, " N"]
+    face: Int32[np.ndarray, " N"]
+    barycentric: Float64[np.ndarray, "N 3"]
+
+    @property
+    def hit(self) -> Bool[np.ndarray, " N"]:
+        """Which rays meet a triangle."""
+        return np.asarray(self.face != NO_FACE)
+
+
+class Caster:
+    """Queries against one mesh. Structures are built at the first query that needs them, and kept."""
+
+    def __init__(self, mesh: TriMesh) -> None:
+        self.mesh = mesh
+
+    def first_hit(self, origins_m: Float64[np.ndarray, "N 3"], directions: Float64[np.ndarray, "N 3"]) -> RayHits:
+        """The first triangle, front or back side, that each ray meets; directions need not have unit length."""
+        face = np.full(len(origins_m), NO_FACE, np.int32)
+        distance_m = np.full(len(origins_m), np.inf)
+        barycentric = np.zeros((len(origins_m), 3))
+        if len(origins_m) == 0 or len(self.mesh.faces) == 0:
+            return RayHits(distance_m, face, barycentric)
+        unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        found = self._embree.run(_single(origins_m), _single(unit), output=1)
+        # Embree's miss is the all-ones id, which reads as -1 here.
+        face = np.where(found["primID"] >= 0, found["primID"], NO_FACE).astype(np.int32)
+        hit = face != NO_FACE
+        u, v = found["u"][hit].astype(np.float64), found["v"][hit].astype(np.float64)
+        barycentric[hit] = np.stack([1.0 - u - v, u, v], axis=1)
+        distance_m[hit] = self._plane_distance_m(
+            origins_m[hit], unit[hit], face[hit], found["tfar"][hit].astype(np.float64)
+        )
+        return RayHits(distance_m, face, barycentric)
+
+    def clear(
+        self, origins_m: Float64[np.ndarray, "N 3"], targets_m: Float64[np.ndarray, "N 3"]
+    ) -> Bool[np.ndarray, " N"]:
+        """Whether no triangle lies between an origin and its target."""
+        if len(origins_m) == 0 or len(self.mesh.faces) == 0:
+            return np.ones(len(origins_m), bool)
+        offset = targets_m - origins_m
+        length_m = np.linalg.norm(offset, axis=1)
+        unit = offset / np.maximum(length_m, 1e-12)[:, None]
+        blocker = self._embree.run(_single(origins_m), _single(unit), _single(length_m), query="OCCLUDED")
+        return np.asarray(blocker < 0)
+
+    def closest_distance(
+        self, points_m: Float64[np.ndarray, "N 3"], max_distance_m: float = 1e6
+    ) -> Float64[np.ndarray, " N"]:
+        """Distance of each point to the nearest triangle, or ``max_distance_m`` where none is nearer.
+
+        A small ``max_distance_m`` makes the search several times as quick.
+        """
+        if len(points_m) == 0 or len(self.mesh.faces) == 0:
+            return np.full(len(points_m), max_distance_m)
+        warp, kernel = _warp_kernel()
+        points = warp.array(_single(points_m), dtype=warp.vec3, device="cpu")
+        distance_m = warp.empty(len(points_m), dtype=float, device="cpu")
+        warp.launch(
+            kernel, len(points_m), [self._warp_mesh.id, points, float(max_distance_m), distance_m], device="cpu"
+        )
+        return np.asarray(distance_m.numpy().astype(np.float64))
+
+    def _plane_distance_m(
+        self,
+        origins_m: Float64[np.ndarray, "N 3"],
+        unit: Float64[np.ndarray, "N 3"],
+        face: Int32[np.ndarray, " N"],
+        coarse_m: Float64[np.ndarray, " N"],
+    ) -> Float64[np.ndarray, " N"]:
+        corners = self.mesh.vertices_m[self.mesh.faces[face]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        slope = np.einsum("ni,ni->n", normal, unit)
+        # On a triangle seen edge-on its plane says nothing about where it was hit.
+        grazing = np.abs(slope) < 1e-3 * np.linalg.norm(normal, axis=1)
+        height = np.einsum("ni,ni->n", normal, corners[:, 0] - origins_m)
+        return np.where(grazing, coarse_m, height / np.where(grazing, 1.0, slope))
+
+    @cached_property
+    def _embree(self) -> Any:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        scene = EmbreeScene()
+        TriangleMesh(scene, _single(self.mesh.vertices_m)[self.mesh.faces])
+        return scene
+
+    @cached_property
+    def _warp_mesh(self) -> Any:
+        warp, _ = _warp_kernel()
+        points = warp.array(_single(self.mesh.vertices_m), dtype=warp.vec3, device="cpu")
+        indices = warp.array(np.ascontiguousarray(self.mesh.faces.ravel()), dtype=int, device="cpu")
+        return warp.Mesh(points=points, indices=indices, bvh_constructor="median")
+
+
+def _single(values: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(values, dtype=np.float32)
+
+
+@cache
+def _warp_kernel() -> tuple[Any, Any]:
+    """Warp, imported at the first distance query, and the kernel of that query."""
+    warp: Any = importlib.import_module("warp")
+    warp.config.quiet = True
+
+    # Warp compiles the function's source; its annotations are Warp's types, not Python's.
+    @no_type_check
+    def nearest(mesh: warp.uint64, points: warp.array(dtype=warp.vec3), limit: float, out: warp.array(dtype=float)):
+        i = warp.tid()
+        query = warp.mesh_query_point_no_sign(mesh, points[i], limit)
+        out[i] = limit
+        if query.result:
+            out[i] = warp.length(points[i] - warp.mesh_eval_position(mesh, query.face, query.u, query.v))
+
+    return warp, warp.kernel(nearest)
