@@ -29,12 +29,13 @@ class RoomRun:
     out: Path
     device: str
     on_event: OnEvent
+    stages: tuple[Stage, ...] = STAGES
     keys: dict[str, str] = field(default_factory=dict)
     values: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.layout = OutputLayout(self.out, self.config.export.split, self.seed, self.room)
-        self.keys = stage_keys(self.config, self.seed, self.room)
+        self.keys = stage_keys(self.config, self.seed, self.room, self.stages)
 
     def run(self, until: str) -> None:
         """Runs the stages up to and with ``until``; the last one publishes the sequence.
@@ -50,7 +51,7 @@ class RoomRun:
         self._report("room_finished")
 
     def _run_stages(self, until: str) -> None:
-        for stage in STAGES:
+        for stage in self.stages:
             try:
                 self._run_stage(stage)
             except PerpetuaError as error:
@@ -58,7 +59,7 @@ class RoomRun:
                 raise
             if stage.name == until:
                 break
-        if until == STAGES[-1].name:
+        if until == self.stages[-1].name:
             self._publish()
 
     def _is_published(self) -> bool:
@@ -66,7 +67,7 @@ class RoomRun:
             audit = json.loads((self.layout.sequence_folder / AUDIT_FILE).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return False
-        return isinstance(audit, dict) and audit.get("key") == self.keys[STAGES[-1].name]
+        return isinstance(audit, dict) and audit.get("key") == self.keys[self.stages[-1].name]
 
     def _run_stage(self, stage: Stage) -> None:
         folder = store.StageFolder(self.layout.work_folder, stage.number, stage.name)
@@ -112,7 +113,7 @@ class RoomRun:
         )
 
     def _folder_of(self, name: str) -> Path:
-        stage = next(stage for stage in STAGES if stage.name == name)
+        stage = next(stage for stage in self.stages if stage.name == name)
         return store.StageFolder(self.layout.work_folder, stage.number, stage.name).final
 
     def _upstream(self, name: str) -> Any:
@@ -128,17 +129,17 @@ class RoomRun:
         target.parent.mkdir(parents=True, exist_ok=True)
         store.link_tree(self._folder_of("export") / SEQUENCE_FOLDER, partial)
         audit = json.loads((self._folder_of("audit") / AUDIT_FILE).read_text(encoding="utf-8"))
-        store.write_json(partial / AUDIT_FILE, {**audit, "key": self.keys[STAGES[-1].name]})
+        store.write_json(partial / AUDIT_FILE, {**audit, "key": self.keys[self.stages[-1].name]})
         store.replace_folder(partial, target)
 
     def _report(self, kind: Any, stage: str = "", **details: Any) -> None:
         self.on_event(Event(kind, self.room, stage, **details))
 
 
-def stage_keys(config: Config, seed: int, room: int) -> dict[str, str]:
+def stage_keys(config: Config, seed: int, room: int, stages: tuple[Stage, ...] = STAGES) -> dict[str, str]:
     """The key of every stage of one room: it changes when the stage, its settings, or anything upstream does."""
     keys: dict[str, str] = {}
-    for stage in STAGES:
+    for stage in stages:
         keys[stage.name] = store.key_of(
             {
                 "stage": stage.name,

@@ -1,0 +1,143 @@
+"""The runner on a table of three small stages: what is computed, what is skipped, what is published."""
+
+import json
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from perpetua.cluster.local import run_rooms
+from perpetua.config import Config
+from perpetua.errors import RouteError
+from perpetua.pipeline.events import Event, OnEvent
+from perpetua.pipeline.layout import OutputLayout
+from perpetua.pipeline.runner import RoomRun, stage_keys
+from perpetua.pipeline.stages import STAGES, Stage, StageContext
+
+RunCount = Counter[str]
+
+
+def _section(*names: str) -> Callable[[Config], dict[str, Any]]:
+    return lambda config: {name: config.model_dump(mode="json")[name] for name in names}
+
+
+def _table(ran: RunCount, fail: str = "") -> tuple[Stage, ...]:
+    def stage(work: Callable[[StageContext], object], name: str) -> Callable[[StageContext], object]:
+        def run(context: StageContext) -> object:
+            ran[name] += 1
+            if name == fail:
+                raise RouteError(f"{name} does not work out")
+            return work(context)
+
+        return run
+
+    def draw(context: StageContext) -> object:
+        return (int(context.seed.stream("x").integers(1000)),)
+
+    def export(context: StageContext) -> object:
+        target = context.folder / "sequence"
+        target.mkdir()
+        (target / "number.txt").write_text(str(context.many("room", int)[0]))
+        return None
+
+    def audit(context: StageContext) -> object:
+        number = int((context.stage_folders["export"] / "sequence" / "number.txt").read_text())
+        (context.folder / "audit.json").write_text(json.dumps({"number": number}))
+        return None
+
+    return (
+        Stage(10, "room", 1, (), _section("rooms"), stage(draw, "room")),
+        Stage(90, "export", 1, ("room",), _section("export"), stage(export, "export")),
+        Stage(95, "audit", 1, ("export",), _section("audit"), stage(audit, "audit")),
+    )
+
+
+def _run(
+    out: Path, ran: RunCount, config: Config | None = None, room: int = 0, fail: str = "", until: str = "audit"
+) -> OutputLayout:
+    config = config or Config()
+    RoomRun(config, 7, room, out, "cpu", lambda event: None, _table(ran, fail)).run(until)
+    return OutputLayout(out, config.export.split, 7, room)
+
+
+def test_finished_room_is_published_and_not_computed_again(tmp_path: Path) -> None:
+    ran: RunCount = Counter()
+    layout = _run(tmp_path, ran)
+    number = (layout.sequence_folder / "number.txt").read_text()
+    _run(tmp_path, ran)
+    assert ran == {"room": 1, "export": 1, "audit": 1}
+    assert json.loads((layout.sequence_folder / "audit.json").read_text())["number"] == int(number)
+    assert sorted(path.name for path in layout.sequence_folder.parent.iterdir()) == [layout.sequence_folder.name]
+
+
+def test_until_stops_and_the_next_run_goes_on(tmp_path: Path) -> None:
+    ran: RunCount = Counter()
+    layout = _run(tmp_path, ran, until="room")
+    assert not layout.sequence_folder.exists()
+    _run(tmp_path, ran)
+    assert ran == {"room": 1, "export": 1, "audit": 1}
+
+
+def test_changed_setting_recomputes_its_stage_and_what_lies_downstream(tmp_path: Path) -> None:
+    ran: RunCount = Counter()
+    _run(tmp_path, ran)
+    _run(tmp_path, ran, Config.model_validate({"audit": {"reprojection_px": 0.5}}))
+    assert ran == {"room": 1, "export": 1, "audit": 2}
+    _run(tmp_path, ran, Config.model_validate({"rooms": {"min_side_m": 4.0}}))
+    assert ran == {"room": 2, "export": 2, "audit": 3}
+
+
+def test_damaged_stage_is_computed_again(tmp_path: Path) -> None:
+    ran: RunCount = Counter()
+    layout = _run(tmp_path, ran, until="export")
+    (layout.work_folder / "10_room" / "value.json").write_text("[1")
+    _run(tmp_path, ran)
+    assert ran == {"room": 2, "export": 1, "audit": 1}
+
+
+def test_failure_is_recorded_and_forgotten_when_mended(tmp_path: Path) -> None:
+    ran: RunCount = Counter()
+    with pytest.raises(RouteError):
+        _run(tmp_path, ran, fail="export")
+    layout = OutputLayout(tmp_path, "train", 7, 0)
+    assert json.loads(layout.failure_file.read_text()) == {"stage": "export", "reason": "export does not work out"}
+    _run(tmp_path, ran)
+    assert not layout.failure_file.exists()
+    assert ran["room"] == 1
+
+
+def test_room_does_not_depend_on_the_others(tmp_path: Path) -> None:
+    alone = _run(tmp_path / "a", Counter(), room=2)
+    for room in range(3):
+        _run(tmp_path / "b", Counter(), room=room)
+    numbers = [(tmp_path / "b" / "train" / f"seed7-room{room:04d}" / "number.txt").read_text() for room in range(3)]
+    assert (alone.sequence_folder / "number.txt").read_text() == numbers[2]
+    assert len(set(numbers)) == 3
+
+
+def test_every_setting_that_a_sequence_depends_on_is_in_some_key() -> None:
+    base = stage_keys(Config(), 0, 0)
+    assert stage_keys(Config(), 1, 0)["room"] != base["room"]
+    assert stage_keys(Config(), 0, 1)["room"] != base["room"]
+    longer = stage_keys(Config.model_validate({"sequence": {"frames": 9}}), 0, 0)
+    changed = {name for name in base if base[name] != longer[name]}
+    assert changed == {stage.name for stage in STAGES} - {"room", "navigation"}
+
+
+def _job(out: Path, room: int, on_event: OnEvent) -> None:
+    if room == 1:
+        raise RouteError("no way through")
+    RoomRun(Config(), 7, room, out, "cpu", on_event, _table(Counter())).run("audit")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_one_failing_room_does_not_stop_the_others(tmp_path: Path, workers: int) -> None:
+    events: list[Event] = []
+    failures = run_rooms(range(4), workers, partial(_job, tmp_path), events.append)
+    assert failures == {1: "no way through"}
+    assert sorted(path.name[-1] for path in (tmp_path / "train").iterdir()) == ["0", "2", "3"]
+    assert {event.room for event in events if event.kind == "room_finished"} == {0, 2, 3}
+    assert [event.text for event in events if event.kind == "room_failed"] == ["no way through"]
