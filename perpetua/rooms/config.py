@@ -1,8 +1,8 @@
 """Settings of the room stage."""
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from perpetua.config_base import Section
 
@@ -20,9 +20,18 @@ class RoomsConfig(Section):
     )
     min_side_m: float = Field(5.0, ge=3.0, le=12.0, description="shortest side of the floor, metres")
     max_side_m: float = Field(8.0, ge=3.0, le=15.0, description="longest side of the floor, metres")
+    min_height_m: float = Field(2.5, ge=2.2, le=5.0, description="lowest ceiling, metres")
+    max_height_m: float = Field(3.1, ge=2.2, le=6.0, description="highest ceiling, metres")
     min_free_floor_m2: float = Field(
         6.0, ge=1.0, le=200.0, description="least connected floor that a person can walk on, square metres"
     )
     max_redraws: int = Field(5, ge=0, le=50, description="further rooms tried when one is rejected")
     timeout_s: float = Field(600.0, ge=10.0, description="longest time to generate one room, seconds")
     max_triangles: int = Field(3_000_000, ge=1000, description="triangles allowed in one room")
+
+    @model_validator(mode="after")
+    def _check_order(self) -> Self:
+        for low, high in (("min_side_m", "max_side_m"), ("min_height_m", "max_height_m")):
+            if getattr(self, low) > getattr(self, high):
+                raise ValueError(f"{low} must not exceed {high}: {getattr(self, low)} > {getattr(self, high)}")
+        return self

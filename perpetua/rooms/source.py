@@ -1,5 +1,6 @@
 """What a room source is, and the loop that draws rooms until one is acceptable."""
 
+import importlib
 import logging
 from collections import Counter
 from pathlib import Path
@@ -45,6 +46,7 @@ def build_room(config: RoomsConfig, navigation: NavigationConfig, seed: StageSee
     Raises:
         RoomError: ``rooms.max_redraws`` further draws were rejected too; the reasons are counted in the message.
     """
+    _fill_registry()
     source = ROOM_SOURCES[config.source]()
     kind = config.kinds[int(seed.stream("kind").integers(len(config.kinds)))]
     reasons: Counter[str] = Counter()
@@ -61,3 +63,9 @@ def build_room(config: RoomsConfig, navigation: NavigationConfig, seed: StageSee
         f"none of {config.max_redraws + 1} draws of a {kind} was acceptable: {counts}; raise rooms.max_redraws or "
         "rooms.min_side_m, or lower rooms.min_free_floor_m2"
     )
+
+
+def _fill_registry() -> None:
+    """The sources that come with Perpetua; here and not on top, since each registers itself in this module."""
+    importlib.import_module("perpetua.rooms.infinigen")
+    importlib.import_module("perpetua.rooms.procedural")

@@ -1,0 +1,134 @@
+"""Rooms by Infinigen Indoors 2, made by ``blender_scripts/infinigen_room.py`` in a process of its own."""
+
+import importlib.util
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from perpetua.errors import EnvironmentSetupError
+from perpetua.geometry.mesh import TriMesh
+from perpetua.rooms.acceptance import RoomRejected
+from perpetua.rooms.config import RoomKind, RoomsConfig
+from perpetua.rooms.source import ROOM_SOURCES
+from perpetua.rooms.types import Room, SceneObject
+from perpetua.seeding import StageSeed
+
+SCRIPT = Path(__file__).parent.parent.parent / "blender_scripts" / "infinigen_room.py"
+STDERR_LINES = 8
+
+
+@ROOM_SOURCES.register("infinigen")
+class InfinigenRooms:
+    """Furnished rooms by Infinigen Indoors 2 (https://infinigen.org)."""
+
+    def make(self, kind: RoomKind, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
+        """A room of the kind, with its ``room.blend`` in ``scratch``.
+
+        Raises:
+            EnvironmentSetupError: Infinigen 2 is not installed.
+            RoomRejected: the generator crashed or took longer than ``rooms.timeout_s``.
+        """
+        if importlib.util.find_spec("infinigen2") is None:
+            raise EnvironmentSetupError(
+                "rooms.source 'infinigen' needs the package infinigen2, which is not installed: run "
+                "pip install 'perpetua[infinigen]', or choose rooms.source=procedural"
+            )
+        rng = seed.stream("infinigen", attempt)
+        folder = scratch.resolve() / "infinigen"
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        job = {
+            "kind": kind,
+            "seed": int(rng.integers(2**31)),
+            "dimensions_m": draw_dimensions_m(config, rng),
+            "folder": str(folder),
+        }
+        (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
+        _run_script(folder, config.timeout_s)
+        (folder / "room.blend").replace(scratch / "room.blend")
+        room = read_room(folder, scratch / "room.blend")
+        shutil.rmtree(folder)
+        return room
+
+
+def draw_dimensions_m(config: RoomsConfig, rng: np.random.Generator) -> list[float]:
+    """Sides along x and y and height of a room, metres, to the centimetre."""
+    sides_m = rng.uniform(config.min_side_m, config.max_side_m, size=2)
+    height_m = rng.uniform(config.min_height_m, config.max_height_m)
+    return [round(float(length_m), 2) for length_m in (*sides_m, height_m)]
+
+
+def read_room(folder: Path, blend_path: Path | None = None) -> Room:
+    """The room that the script left in a folder; ``blend_path`` is where its .blend is now."""
+    table = json.loads((folder / "room.json").read_text(encoding="utf-8"))
+    with np.load(folder / "meshes.npz", allow_pickle=False) as arrays:
+        vertices_m, faces = arrays["vertices_m"], arrays["faces"]
+        vertex_start, face_start = arrays["vertex_start"], arrays["face_start"]
+    objects = tuple(
+        _scene_object(
+            entry,
+            TriMesh(
+                vertices_m[vertex_start[k] : vertex_start[k + 1]].copy(),
+                faces[face_start[k] : face_start[k + 1]].copy(),
+            ),
+        )
+        for k, entry in enumerate(table["objects"])
+    )
+    return Room(
+        name=f"infinigen_{table['kind']}",
+        kind=table["kind"],
+        floor_polygon_m=np.array(table["floor_polygon_m"], np.float64),
+        height_m=table["height_m"],
+        objects=objects,
+        lights=(),
+        blend_path=folder / "room.blend" if blend_path is None else blend_path,
+    )
+
+
+def _scene_object(entry: dict[str, Any], mesh: TriMesh) -> SceneObject:
+    return SceneObject(
+        object_index=entry["object_index"],
+        name=entry["name"],
+        category=entry["category"],
+        mesh=mesh,
+        material=None,
+        walkable=entry["walkable"],
+        opaque=entry["opaque"],
+    )
+
+
+def _run_script(folder: Path, timeout_s: float) -> None:
+    """Runs the script in its own process group, so that nothing of it outlives this call."""
+    resources = folder / "blender"
+    resources.mkdir()
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(resources), "PYTHONHASHSEED": "0"}
+    command = [sys.executable, str(SCRIPT), str(folder / "job.json")]
+    with subprocess.Popen(
+        command,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    ) as process:
+        try:
+            _, stderr = process.communicate(timeout=timeout_s)
+        except subprocess.TimeoutExpired:
+            raise RoomRejected(
+                "timeout", f"Infinigen took longer than rooms.timeout_s = {timeout_s:.0f} seconds"
+            ) from None
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+    if process.returncode != 0:
+        last_lines = "\n".join(stderr.strip().splitlines()[-STDERR_LINES:])
+        raise RoomRejected("crash", f"Infinigen failed with exit code {process.returncode}:\n{last_lines}")
