@@ -1,0 +1,139 @@
+"""Points that may become tracks: on rendered surfaces of the room, and on the meshes of actors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int64
+
+from perpetua.actors.types import ActorMesh
+from perpetua.cameras.types import CameraPath
+from perpetua.geometry.mesh import TriMesh, face_areas_m2, join
+from perpetua.geometry.pinhole import unproject
+from perpetua.geometry.raycast import Caster
+from perpetua.geometry.transforms import transform_points
+from perpetua.rendering.types import RenderedView
+from perpetua.tracks.surface import SceneMeshes, SurfacePoints, join_points, plane_barycentric
+
+SAMPLED_IMAGES = 64
+COVER_M = 0.04
+COVER_GAP_M = 1e-4
+COVER_TIMES = 3
+
+
+@dataclass(frozen=True)
+class PixelRays:
+    """Rays through points of pixels that show the room, with what those pixels show."""
+
+    origin_m: Float64[np.ndarray, "N 3"]
+    direction: Float64[np.ndarray, "N 3"]
+    object_index: Int64[np.ndarray, " N"]
+
+
+class StaticSurfaces:
+    """Draws points on surfaces of the room that some view shows."""
+
+    def __init__(self, meshes: SceneMeshes, cameras: tuple[CameraPath, ...], views: tuple[RenderedView, ...]) -> None:
+        self.meshes, self.cameras, self.views = meshes, cameras, views
+        self.thing = np.array(sorted(meshes.static), np.int64)
+        parts = [meshes.static[index] for index in self.thing.tolist()]
+        self.caster = Caster(join(parts))
+        self.first_face = np.cumsum([0] + [len(part.faces) for part in parts])
+
+    def draw(self, count: int, rng: np.random.Generator) -> SurfacePoints:
+        """About ``count`` points, spread evenly over views and times, and in each image over objects."""
+        images = [(view, frame) for view in range(len(self.views)) for frame in self._frames(rng)]
+        share = -(-count // len(images))
+        rays = [self._rays(view, frame, share, rng) for view, frame in images]
+        origin_m = np.concatenate([ray.origin_m for ray in rays])
+        direction = np.concatenate([ray.direction for ray in rays])
+        shown = np.concatenate([ray.object_index for ray in rays])
+        return self._on_mesh(origin_m, direction, shown)
+
+    def _frames(self, rng: np.random.Generator) -> list[int]:
+        """Frames at even distances with a random start, as many as make ``SAMPLED_IMAGES`` over all views."""
+        frames = len(self.views[0].depth_m)
+        wanted = min(frames, max(1, SAMPLED_IMAGES // len(self.views)))
+        place = (np.arange(wanted) + rng.random()) * frames / wanted
+        return [int(frame) for frame in np.minimum(place, frames - 1)]
+
+    def _rays(self, view: int, frame: int, count: int, rng: np.random.Generator) -> PixelRays:
+        shown = np.asarray(self.views[view].object_index[frame]).reshape(-1)
+        pixel = np.flatnonzero(np.isin(shown, self.thing))
+        if len(pixel) == 0:
+            return PixelRays(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64))
+        pixels_of = np.bincount(shown[pixel])
+        weight = np.cumsum(1.0 / np.sqrt(pixels_of[shown[pixel]]))
+        drawn = pixel[np.minimum(np.searchsorted(weight, rng.random(count) * weight[-1]), len(pixel) - 1)]
+        camera = self.cameras[view]
+        row, column = np.divmod(drawn, camera.intrinsics.width_px)
+        pixel_px = np.stack([column, row], axis=1) + rng.random((count, 2)) - 0.5
+        world_from_camera = camera.world_from_camera[frame]
+        end_m = transform_points(world_from_camera, unproject(camera.intrinsics, pixel_px, np.ones(count)))
+        origin_m = np.repeat(world_from_camera[None, :3, 3], count, axis=0)
+        return PixelRays(origin_m, end_m - origin_m, shown[drawn].astype(np.int64))
+
+    def _on_mesh(
+        self,
+        origin_m: Float64[np.ndarray, "N 3"],
+        direction: Float64[np.ndarray, "N 3"],
+        shown: Int64[np.ndarray, " N"],
+    ) -> SurfacePoints:
+        """The exact points where rays meet the object that their pixel shows; other rays are dropped."""
+        hits = self.caster.first_hit(origin_m, direction)
+        place = np.searchsorted(self.first_face, hits.face, side="right") - 1
+        found = np.flatnonzero(hits.hit)
+        found = found[self.thing[place[found]] == shown[found]]
+        joined = self.caster.mesh
+        corner_m = joined.vertices_m[joined.faces[hits.face[found]]]
+        weight = plane_barycentric(_plane_point(origin_m[found], direction[found], corner_m), corner_m)
+        sound = np.isfinite(weight).all(axis=1) & (weight > -1e-3).all(axis=1)
+        weight = np.clip(weight[sound], 0.0, None)
+        weight /= weight.sum(axis=1, keepdims=True)
+        face = hits.face[found] - self.first_face[place[found]]
+        return SurfacePoints(shown[found][sound].astype(np.int32), face[sound].astype(np.int32), weight)
+
+
+def _plane_point(
+    origin_m: Float64[np.ndarray, "N 3"], direction: Float64[np.ndarray, "N 3"], corner_m: Float64[np.ndarray, "N 3 3"]
+) -> Float64[np.ndarray, "N 3"]:
+    normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = np.einsum("nc,nc->n", normal, corner_m[:, 0] - origin_m) / np.einsum("nc,nc->n", normal, direction)
+        return np.asarray(origin_m + along[:, None] * direction)
+
+
+def draw_on_actors(actors: tuple[ActorMesh, ...], count: int, rng: np.random.Generator) -> SurfacePoints:
+    """About ``count`` points, as many on each actor, area-weighted at a middle frame, none under a garment."""
+    share = -(-count // len(actors))
+    groups = []
+    for actor in actors:
+        middle_m = actor.vertices_m[len(actor.vertices_m) // 2]
+        edge = np.cumsum(face_areas_m2(middle_m, actor.faces))
+        face = np.minimum(np.searchsorted(edge, rng.random(share) * edge[-1]), len(edge) - 1)
+        points = SurfacePoints(np.full(share, actor.object_index, np.int32), face.astype(np.int32), _inside(share, rng))
+        groups.append(points.take(~_covered(actor, points)))
+    return join_points(groups)
+
+
+def _inside(count: int, rng: np.random.Generator) -> Float64[np.ndarray, "N 3"]:
+    """Uniform in a triangle (Osada et al. 2002, Shape Distributions)."""
+    root, other = np.sqrt(rng.random(count)), rng.random(count)
+    return np.stack([1.0 - root, root * (1.0 - other), root * other], axis=1)
+
+
+def _covered(actor: ActorMesh, points: SurfacePoints) -> Bool[np.ndarray, " N"]:
+    """Whether another part lies close over a point at all of a few times, as a shirt lies over skin.
+
+    Rendered depth alone cannot tell skin from cloth a few millimetres above it.
+    """
+    part = np.repeat(np.arange(len(actor.parts)), [len(part.faces) for part in actor.parts])
+    covered = np.ones(len(points), bool)
+    for frame in np.unique(np.linspace(0, len(actor.vertices_m) - 1, COVER_TIMES).round().astype(int)).tolist():
+        mesh = TriMesh(actor.vertices_m[frame].astype(np.float64), actor.faces)
+        corner_m = mesh.vertices_m[mesh.faces[points.face]]
+        normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        point_m = np.einsum("nk,nkc->nc", points.barycentric, corner_m)
+        hits = Caster(mesh).first_hit(point_m + COVER_GAP_M * normal, normal)
+        covered &= (hits.distance_m < COVER_M) & (part[hits.face] != part[points.face])
+    return covered

@@ -1,0 +1,75 @@
+"""Which candidates become tracks: those that spread best over objects, image area, views and time."""
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32, Int64
+from scipy.sparse import csr_matrix
+
+from perpetua.cameras.types import CameraPath
+from perpetua.geometry.pinhole import project
+from perpetua.geometry.transforms import invert_rigid, transform_points
+
+IMAGE_CELLS = 8
+TIMES = 16
+ROUNDS = 64
+JITTER = 0.1
+# How much spreading over objects counts beside spreading over the images.
+OBJECT_WEIGHT = 4.0
+
+
+def spread(
+    wanted: int,
+    object_index: Int32[np.ndarray, " N"],
+    cells: csr_matrix,
+    rng: np.random.Generator,
+) -> Int64[np.ndarray, " M"]:
+    """Chooses ``wanted`` candidates greedily, a batch at a time, best first.
+
+    A candidate is worth more where few were chosen before: in the image cells it is seen in, and on its object.
+    An object's share grows with the root of its candidates, so that walls do not crowd out small things.
+
+    Args:
+        wanted: how many to choose, at most the number of candidates.
+        object_index: object of each candidate.
+        cells: candidates x (view, time, image cell), 1 where the candidate is seen; see ``seen_cells``.
+        rng: breaks ties.
+    """
+    _, thing, candidates_of = np.unique(object_index, return_inverse=True, return_counts=True)
+    thing, appetite = thing.reshape(-1), np.sqrt(candidates_of.astype(np.float64))
+    seen_in = np.maximum(np.asarray(cells.sum(axis=1)).reshape(-1), 1.0)
+    in_cell, on_object = np.zeros(cells.shape[1]), np.zeros(len(appetite))
+    chosen: list[Int64[np.ndarray, " B"]] = []
+    taken = np.zeros(len(object_index), bool)
+    appetite *= OBJECT_WEIGHT / appetite.max(initial=1.0)
+    for batch in np.array_split(np.arange(wanted), min(ROUNDS, max(wanted, 1))):
+        gain = cells @ (1.0 / (1.0 + in_cell)) / seen_in
+        gain += (appetite / (1.0 + on_object))[thing]
+        gain *= 1.0 + JITTER * rng.random(len(gain))
+        gain[taken] = -1.0
+        best = np.argsort(-gain, kind="stable")[: len(batch)]
+        chosen.append(best)
+        taken[best] = True
+        in_cell += np.asarray(cells[best].sum(axis=0)).reshape(-1)
+        on_object += np.bincount(thing[best], minlength=len(on_object))
+    return np.concatenate(chosen)
+
+
+def seen_cells(
+    position_m: Float64[np.ndarray, "T N 3"], cameras: tuple[CameraPath, ...], visible: Bool[np.ndarray, "C T N"]
+) -> csr_matrix:
+    """Candidates x (view, time, image cell) at ``TIMES`` frames: 1 where the candidate is seen."""
+    views, frames, count = visible.shape
+    times = np.unique(np.linspace(0, frames - 1, TIMES).round().astype(int))
+    rows: list[Int64[np.ndarray, " B"]] = []
+    columns: list[Int64[np.ndarray, " B"]] = []
+    for view, camera in enumerate(cameras):
+        camera_from_world = invert_rigid(camera.world_from_camera)
+        size_px = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
+        for place, frame in enumerate(times.tolist()):
+            seen = np.flatnonzero(visible[view, frame])
+            camera_m = transform_points(camera_from_world[frame], position_m[frame, seen])
+            share = (project(camera.intrinsics, camera_m) + 0.5) / size_px
+            cell = np.clip((share * IMAGE_CELLS).astype(np.int64), 0, IMAGE_CELLS - 1)
+            rows.append(seen)
+            columns.append(((view * len(times) + place) * IMAGE_CELLS + cell[:, 1]) * IMAGE_CELLS + cell[:, 0])
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    return csr_matrix((np.ones(len(row)), (row, column)), shape=(count, views * len(times) * IMAGE_CELLS**2))

@@ -1,0 +1,93 @@
+"""Which triangles have an inside that no camera sees."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Float64, Int64, Integer
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from perpetua.tracks.surface import SceneMeshes, SurfacePoints
+
+# Eyes, mouth, neck and hems leave holes in a body that is closed for every practical purpose.
+OPEN_EDGE_SHARE = 0.03
+
+
+@dataclass(frozen=True)
+class ClosedSides:
+    """Per face, or per point on a face: whether its back is the inside of a closed surface, and that surface's box."""
+
+    closed: Bool[np.ndarray, " N"]
+    box_m: Float64[np.ndarray, "N 2 3"]
+
+
+class SideTable:
+    """The closed surfaces of a scene, found once per object and only for objects that are asked for."""
+
+    def __init__(self, meshes: SceneMeshes) -> None:
+        self.meshes = meshes
+        self._known: dict[int, ClosedSides] = {}
+
+    def of(self, points: SurfacePoints) -> ClosedSides:
+        """Looks up points. Boxes of actors are empty: cameras keep their distance and are never inside one."""
+        closed, box_m = np.zeros(len(points), bool), np.zeros((len(points), 2, 3))
+        for object_index in np.unique(points.object_index).tolist():
+            members = np.flatnonzero(points.object_index == object_index)
+            sides = self._of_object(object_index)
+            closed[members] = sides.closed[points.face[members]]
+            if object_index in self.meshes.static:
+                box_m[members] = sides.box_m[points.face[members]]
+        return ClosedSides(closed, box_m)
+
+    def _of_object(self, object_index: int) -> ClosedSides:
+        if object_index not in self._known:
+            if object_index in self.meshes.static:
+                mesh = self.meshes.static[object_index]
+                self._known[object_index] = closed_sides(mesh.vertices_m, mesh.faces)
+            else:
+                vertices_m = self.meshes.moving_vertices_m[object_index][0]
+                self._known[object_index] = closed_sides(vertices_m, self.meshes.moving_faces[object_index])
+        return self._known[object_index]
+
+
+def closed_sides(vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray, "F 3"]) -> ClosedSides:
+    """Finds connected surfaces that are closed, consistently wound, and face outwards.
+
+    Vertices at one position count as one, because seams of textures split them. A surface is closed when at most
+    ``OPEN_EDGE_SHARE`` of its edges lack a partner of the opposite direction, and faces outwards when its signed
+    volume is positive.
+    """
+    _, vertex = np.unique(vertices_m, axis=0, return_inverse=True)
+    corner = vertex.reshape(-1)[faces]
+    surface = _surface_of_faces(corner)
+    count = int(surface.max(initial=-1)) + 1
+    open_edges = np.bincount(surface, weights=_unpaired_edges(corner), minlength=count)
+    edges = 3.0 * np.bincount(surface, minlength=count)
+    triangle_m = vertices_m[faces].astype(np.float64)
+    volume_m3 = np.einsum("fc,fc->f", triangle_m[:, 0], np.cross(triangle_m[:, 1], triangle_m[:, 2])) / 6.0
+    outward = np.bincount(surface, weights=volume_m3, minlength=count) > 0.0
+    low_m, high_m = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low_m, surface, triangle_m.min(axis=1))
+    np.maximum.at(high_m, surface, triangle_m.max(axis=1))
+    closed = outward & (open_edges <= OPEN_EDGE_SHARE * edges)
+    return ClosedSides(closed[surface], np.stack([low_m, high_m], axis=1)[surface])
+
+
+def _surface_of_faces(corner: Integer[np.ndarray, "F 3"]) -> Int64[np.ndarray, " F"]:
+    start, end = corner[:, [0, 1]].reshape(-1), corner[:, [1, 2]].reshape(-1)
+    size = int(corner.max(initial=-1)) + 1
+    graph = coo_matrix((np.ones(len(start), np.int8), (start, end)), shape=(size, size))
+    _, label = connected_components(graph, directed=False)
+    _, surface = np.unique(label[corner[:, 0]], return_inverse=True)
+    return np.asarray(surface, np.int64).reshape(-1)
+
+
+def _unpaired_edges(corner: Integer[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
+    """For each face the number of its edges that are not used exactly once in each direction."""
+    start, end = corner.astype(np.int64).reshape(-1), np.roll(corner, -1, axis=1).astype(np.int64).reshape(-1)
+    size = int(corner.max(initial=-1)) + 1
+    forward, there, uses = np.unique(start * size + end, return_inverse=True, return_counts=True)
+    backward = end * size + start
+    place = np.minimum(np.searchsorted(forward, backward), len(forward) - 1)
+    paired = (forward[place] == backward) & (uses[place] == 1) & (uses[there.reshape(-1)] == 1)
+    return np.asarray((~paired).reshape(-1, 3).sum(axis=1), np.float64)
