@@ -20,6 +20,10 @@ class MotionConfig(Section):
     """Where full-body motion comes from."""
 
     source: str = Field("procedural", description="motion source: procedural")
+    actions: str = Field("everyday", description="list of action descriptions to draw from: a name in configs/actions")
+    descriptions: tuple[str, ...] = Field(
+        (), description="action descriptions in plain words to draw from instead of the list, one per actor"
+    )
 
 
 class ActorsConfig(Section):

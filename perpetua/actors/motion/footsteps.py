@@ -1,0 +1,164 @@
+"""Which foot stands where and when."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from perpetua.actors.motion.path import MARGIN_S, RoutePath
+from perpetua.actors.motion.style import GaitStyle
+
+LEFT, RIGHT = 0, 1
+# A foot steps again when it would land this far from where it stands, or turned by this much (25 degrees).
+_POSITION_TOLERANCE_M = 0.09
+_TURN_TOLERANCE_RAD = 0.436
+_DECISION_S = 0.02
+# Sole to sole, between the lines through both ankles.
+_LEAST_FOOT_GAP_M = 0.085
+_PASSING_GAP_M = 0.105
+_FOOT_LENGTH_M = 0.27
+
+
+@dataclass(frozen=True)
+class StepTiming:
+    """Duration of a gait cycle (two steps) and of the parts a foot spends on the floor and in the air, seconds."""
+
+    cycle_s: float
+    support_s: float
+    swing_s: float
+
+
+def step_timing(speed_mps: float, turn_rps: float, hip_height_m: float, cycle_factor: float) -> StepTiming:
+    """Timing of steps at a pace.
+
+    Length of a cycle over hip height = 1.346 sqrt(speed over hip height), support = 0.752 cycle - 0.143 s: Inman,
+    Ralston and Todd, Human Walking (1981), in the form of Boulic, Magnenat-Thalmann and Thalmann, A global human
+    walking model with real-time kinematic personification, The Visual Computer 6 (1990). Turning counts as pace, so
+    that a turn on the spot is stepped through; very slow paces take shorter steps instead of ever slower ones.
+    """
+    pace = float(np.hypot(speed_mps, 0.7 * turn_rps)) / hip_height_m
+    cycle_s = float(np.clip(1.346 / np.sqrt(max(pace, 1e-6)), 0.85, 1.6)) * cycle_factor
+    support_s = 0.752 * cycle_s - 0.143
+    return StepTiming(cycle_s, support_s, cycle_s - support_s)
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A foot on the floor: the floor point under its ankle, its yaw, and when it lands and lifts.
+
+    ``dodge_m`` is how far (x, y) the swing that leads here bends aside to pass the other foot.
+    """
+
+    position_m: Float64[np.ndarray, "3"]
+    yaw_rad: float
+    land_s: float
+    lift_s: float
+    dodge_m: Float64[np.ndarray, "2"]
+
+
+@dataclass(frozen=True)
+class _Place:
+    position_m: Float64[np.ndarray, "3"]
+    yaw_rad: float
+
+
+class FootstepPlanner:
+    """Places each foot where the body axis will pass over it in the middle of its stance."""
+
+    def __init__(
+        self,
+        path: RoutePath,
+        style: GaitStyle,
+        hip_height_m: float,
+        ankle_ahead_m: float,
+        rng: np.random.Generator,
+    ) -> None:
+        self._path = path
+        self._style = style
+        self._hip_height_m = hip_height_m
+        self._ankle_ahead_m = ankle_ahead_m
+        self._rng = rng
+
+    def plan(self) -> tuple[tuple[Plant, ...], tuple[Plant, ...]]:
+        """The left and the right foot's plants in order; the first stands from the start, the last stays for good."""
+        time_s = -MARGIN_S + 0.5 + self._style.phase_s
+        places = [self._ideal(side, time_s) for side in (LEFT, RIGHT)]
+        standing = [Plant(place.position_m, place.yaw_rad, -np.inf, np.inf, np.zeros(2)) for place in places]
+        done: tuple[list[Plant], list[Plant]] = ([], [])
+        turn = self._style.first_side
+        while time_s < self._path.end_s + 1.0:
+            timing = self._timing(time_s)
+            side = self._next_side(standing, turn, time_s + timing.swing_s)
+            if side is None:
+                time_s += _DECISION_S
+                continue
+            old = standing[side]
+            done[side].append(Plant(old.position_m, old.yaw_rad, old.land_s, time_s, old.dodge_m))
+            standing[side] = self._step(side, old, standing[1 - side], time_s, timing)
+            turn = 1 - side
+            time_s += max(0.5 * timing.cycle_s, timing.swing_s + 0.06)
+        return (*done[LEFT], standing[LEFT]), (*done[RIGHT], standing[RIGHT])
+
+    def _timing(self, time_s: float) -> StepTiming:
+        ahead_s = time_s + np.linspace(0.0, 0.8, 9)
+        speed_mps, turn_rps = float(self._path.speed_mps(ahead_s).mean()), float(self._path.turn_rps(ahead_s).mean())
+        return step_timing(speed_mps, turn_rps, self._hip_height_m, self._style.cycle_factor)
+
+    def _next_side(self, standing: list[Plant], turn: int, land_s: float) -> int | None:
+        """The foot to lift now: the one whose turn it is if it has to, else the other if it has to."""
+        if self._need(standing[turn], turn, land_s) >= 1.0:
+            return turn
+        if self._need(standing[1 - turn], 1 - turn, land_s) >= 1.0:
+            return 1 - turn
+        return None
+
+    def _need(self, plant: Plant, side: int, land_s: float) -> float:
+        ideal = self._ideal(side, land_s)
+        distance_m = float(np.linalg.norm(ideal.position_m[:2] - plant.position_m[:2]))
+        turn_rad = abs(ideal.yaw_rad - plant.yaw_rad)
+        return max(distance_m / _POSITION_TOLERANCE_M, turn_rad / _TURN_TOLERANCE_RAD)
+
+    def _ideal(self, side: int, time_s: float) -> _Place:
+        moment_s = np.array([time_s])
+        heading_rad = float(self._path.heading_rad(moment_s)[0])
+        walking = float(np.clip(self._path.speed_mps(moment_s)[0] / 0.8, 0.0, 1.0))
+        half_m = (1 - walking) * self._style.stand_half_width_m + walking * self._style.walk_half_width_m
+        outward = 1.0 if side == LEFT else -1.0
+        ahead, left = _axes(heading_rad)
+        position_m = self._path.position_m(moment_s)[0].copy()
+        position_m[:2] += self._ankle_ahead_m * ahead + outward * half_m * left
+        return _Place(position_m, heading_rad + outward * self._style.toe_out_rad)
+
+    def _step(self, side: int, old: Plant, other: Plant, lift_s: float, timing: StepTiming) -> Plant:
+        land_s = lift_s + timing.swing_s
+        ideal = self._ideal(side, land_s + 0.5 * timing.support_s)
+        position_m = ideal.position_m.copy()
+        position_m[:2] += np.clip(self._rng.normal(0.0, 0.007, 2), -0.015, 0.015)
+        yaw_rad = ideal.yaw_rad + float(np.clip(self._rng.normal(0.0, 0.02), -0.05, 0.05))
+        outward = 1.0 if side == LEFT else -1.0
+        _, left = _axes(yaw_rad)
+        gap_m = outward * float((position_m[:2] - other.position_m[:2]) @ left)
+        position_m[:2] += max(0.0, _LEAST_FOOT_GAP_M - gap_m) * outward * left
+        aside = outward * _axes(0.5 * (old.yaw_rad + yaw_rad))[1]
+        dodge_m = _passing_room_m(old.position_m[:2], position_m[:2], other.position_m[:2], aside) * aside
+        return Plant(position_m, yaw_rad, land_s, np.inf, dodge_m)
+
+
+def _axes(yaw_rad: float) -> tuple[Float64[np.ndarray, "2"], Float64[np.ndarray, "2"]]:
+    ahead = np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
+    return ahead, np.array([-ahead[1], ahead[0]])
+
+
+def _passing_room_m(
+    start_m: Float64[np.ndarray, "2"],
+    end_m: Float64[np.ndarray, "2"],
+    other_m: Float64[np.ndarray, "2"],
+    aside: Float64[np.ndarray, "2"],
+) -> float:
+    """How far a swing must bend aside, at its middle, to pass the standing foot."""
+    share = np.linspace(0.15, 0.85, 15)
+    offset_m = start_m + share[:, None] * (end_m - start_m) - other_m
+    beside_m = offset_m @ aside
+    along_m = np.sqrt(np.maximum(np.sum(offset_m**2, axis=1) - beside_m**2, 0.0))
+    short_m = np.where(along_m < _FOOT_LENGTH_M, np.maximum(_PASSING_GAP_M - beside_m, 0.0), 0.0)
+    return float(np.clip(np.max(short_m / np.sin(np.pi * share) ** 2), 0.0, 0.2))

@@ -1,0 +1,72 @@
+"""A route as functions of time."""
+
+import numpy as np
+from jaxtyping import Float64
+from scipy.interpolate import make_interp_spline
+from scipy.ndimage import gaussian_filter1d
+
+from perpetua.actors.types import Route
+
+# Feet are planned this long before the first and after the last frame, so that both fall amid a step.
+MARGIN_S = 4.0
+_GRID_HZ = 100.0
+_END_VELOCITY_S = 0.25
+
+
+class RoutePath:
+    """Position and heading at any time; outside the route's frames the body goes on at its last velocity."""
+
+    def __init__(self, route: Route, fps: float) -> None:
+        frames = len(route.heading_rad)
+        self.end_s = (frames - 1) / fps
+        self._time_s = np.arange(frames) / fps
+        self._knots = np.column_stack([route.position_m, np.unwrap(route.heading_rad)])
+        degree = min(3, frames - 1)
+        self._spline = make_interp_spline(self._time_s, self._knots, k=degree) if degree > 0 else None
+        back = min(frames - 1, max(1, round(_END_VELOCITY_S * fps)))
+        self._end_velocity = np.zeros((2, 4))
+        if back > 0:
+            self._end_velocity[0] = (self._knots[back] - self._knots[0]) * fps / back
+            self._end_velocity[1] = (self._knots[-1] - self._knots[-1 - back]) * fps / back
+        # Where the body was heading and how high it stood beyond the ends is anybody's guess: they stay.
+        self._end_velocity[:, 2:] = 0.0
+        self._tabulate()
+
+    def _tabulate(self) -> None:
+        self._grid_s = np.arange(-MARGIN_S, self.end_s + MARGIN_S, 1.0 / _GRID_HZ)
+        raw = self._evaluate(self._grid_s)
+        rate = np.gradient(raw, self._grid_s, axis=0)
+        self._speed_mps = gaussian_filter1d(np.hypot(rate[:, 0], rate[:, 1]), 0.12 * _GRID_HZ)
+        self._turn_rps = gaussian_filter1d(np.abs(rate[:, 3]), 0.15 * _GRID_HZ)
+        # A pelvis turns softly: the route's heading may have corners.
+        self._heading_rad = gaussian_filter1d(raw[:, 3], 0.08 * _GRID_HZ, mode="nearest")
+        velocity = np.column_stack([gaussian_filter1d(rate[:, axis], 0.15 * _GRID_HZ) for axis in (0, 1)])
+        self._acceleration_mps2 = np.gradient(velocity, self._grid_s, axis=0)
+
+    def _evaluate(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, "N 4"]:
+        inside_s = np.clip(time_s, 0.0, self.end_s)
+        values = self._knots[np.zeros(len(time_s), int)] if self._spline is None else self._spline(inside_s)
+        before_s, after_s = np.minimum(time_s, 0.0), np.maximum(time_s - self.end_s, 0.0)
+        return np.asarray(values + before_s[:, None] * self._end_velocity[0] + after_s[:, None] * self._end_velocity[1])
+
+    def position_m(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, "N 3"]:
+        """The body axis on the floor."""
+        return self._evaluate(time_s)[:, :3]
+
+    def heading_rad(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+        """Heading about Z, without jumps of a full turn."""
+        return np.interp(time_s, self._grid_s, self._heading_rad)
+
+    def speed_mps(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+        """Speed over the floor, smoothed over about a quarter of a second."""
+        return np.interp(time_s, self._grid_s, self._speed_mps)
+
+    def turn_rps(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+        """Rate of turning, rad/s, never negative."""
+        return np.interp(time_s, self._grid_s, self._turn_rps)
+
+    def forward_acceleration_mps2(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+        """Acceleration along the heading."""
+        ahead = self.heading_rad(time_s)
+        along_x, along_y = (np.interp(time_s, self._grid_s, self._acceleration_mps2[:, axis]) for axis in (0, 1))
+        return np.asarray(along_x * np.cos(ahead) + along_y * np.sin(ahead))
