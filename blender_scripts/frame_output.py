@@ -5,6 +5,8 @@ from pathlib import Path
 
 import bpy
 
+# JPEG markers (ITU-T T.81, table B.1).
+APPLICATION_1, APPLICATION_15, COMMENT, START_OF_SCAN = 0xE1, 0xEF, 0xFE, 0xDA
 GROUND_TRUTH_PREFIX = "ground_truth_"
 
 
@@ -39,7 +41,20 @@ class FrameOutput:
         # The node adds Blender's frame number to the name it was given.
         written = folder / f"{GROUND_TRUTH_PREFIX}{bpy.context.scene.frame_current:04d}.exr"
         written.replace(exr)
+        jpeg.write_bytes(without_metadata(jpeg.read_bytes()))
         return jpeg, exr
+
+
+def without_metadata(jpeg: bytes) -> bytes:
+    """A JPEG less its comments and application data (but JFIF): Blender stamps the date and render time into them."""
+    kept = [jpeg[:2]]
+    position = 2
+    while jpeg[position] == 0xFF and jpeg[position + 1] != START_OF_SCAN:
+        marker, length = jpeg[position + 1], int.from_bytes(jpeg[position + 2 : position + 4], "big")
+        if marker != COMMENT and not APPLICATION_1 <= marker <= APPLICATION_15:
+            kept.append(jpeg[position : position + 2 + length])
+        position += 2 + length
+    return b"".join([*kept, jpeg[position:]])
 
 
 def _exr_node(tree: bpy.types.NodeTree) -> bpy.types.Node:

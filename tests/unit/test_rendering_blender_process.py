@@ -1,0 +1,126 @@
+"""Running a script of Blender: events, last words, time-outs, and that no process is left behind."""
+
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+from perpetua.errors import AssetError, EnvironmentSetupError
+from perpetua.rendering.blender import BlenderError, Event, run_script
+
+
+def _run(tmp_path: Path, body: str, timeout_s: float = 20.0, blender: str | None = None) -> list[Event]:
+    script = tmp_path / "fake.py"
+    script.write_text("import json, os, signal, subprocess, sys, time\n" + textwrap.dedent(body))
+    events: list[Event] = []
+    run_script(
+        script,
+        tmp_path / "job.json",
+        blender=blender,
+        scratch=tmp_path,
+        silence_timeout_s=timeout_s,
+        on_event=events.append,
+    )
+    return events
+
+
+def _wait_until_gone(pid: int) -> None:
+    deadline = time.monotonic() + 5.0
+    while Path(f"/proc/{pid}").exists() and "State:\tZ" not in Path(f"/proc/{pid}/status").read_text():
+        assert time.monotonic() < deadline, f"process {pid} is still there"
+        time.sleep(0.02)
+
+
+def test_only_events_are_handed_on(tmp_path: Path) -> None:
+    events = _run(
+        tmp_path,
+        """
+        print("Blender 4.2.0")
+        print(json.dumps({"event": "frame", "frame": 3}), flush=True)
+        print("[1, 2]")
+        print('{"no": "event"}')
+        sys.stdout.write('{"event": "la'); sys.stdout.flush(); time.sleep(0.1)
+        print('st", "job": "%s"}' % os.path.basename(sys.argv[1]))
+        """,
+    )
+    assert events == [{"event": "frame", "frame": 3}, {"event": "last", "job": "job.json"}]
+
+
+def test_settings_folder_is_private(tmp_path: Path) -> None:
+    events = _run(tmp_path, 'print(json.dumps({"event": "e", "at": os.environ["BLENDER_USER_RESOURCES"]}))')
+    assert Path(events[0]["at"]).parent == tmp_path.resolve()
+
+
+def test_failure_shows_the_last_words(tmp_path: Path) -> None:
+    with pytest.raises(BlenderError, match="exit code 3") as error:
+        _run(tmp_path, 'print("Fra:1 Mem:1M", file=sys.stderr); print("out of luck", file=sys.stderr); sys.exit(3)')
+    assert error.value.tail == "out of luck"
+
+
+def test_death_by_signal_is_named(tmp_path: Path) -> None:
+    with pytest.raises(BlenderError, match=r"SIGKILL.*memory"):
+        _run(tmp_path, "os.kill(os.getpid(), signal.SIGKILL)")
+
+
+def test_missing_system_library_names_the_packages(tmp_path: Path) -> None:
+    body = 'sys.exit("ImportError: libXi.so.6: cannot open shared object file: No such file or directory")'
+    with pytest.raises(EnvironmentSetupError, match="libxi6"):
+        _run(tmp_path, body)
+
+
+def test_silence_ends_the_process_and_its_children(tmp_path: Path) -> None:
+    body = f"""
+        child = subprocess.Popen([{sys.executable!r}, "-c", "import time; time.sleep(60)"])
+        open({str(tmp_path / "pids")!r}, "w").write(f"{{os.getpid()}} {{child.pid}}")
+        print("not an event", flush=True)
+        time.sleep(60)
+        """
+    started = time.monotonic()
+    with pytest.raises(BlenderError, match="no progress for 1 s"):
+        _run(tmp_path, body, timeout_s=1.0)
+    assert time.monotonic() - started < 10.0
+    for pid in (tmp_path / "pids").read_text().split():
+        _wait_until_gone(int(pid))
+
+
+def test_events_keep_a_slow_process_alive(tmp_path: Path) -> None:
+    body = """
+        for k in range(6):
+            time.sleep(0.3)
+            print(json.dumps({"event": "tick", "k": k}), flush=True)
+        """
+    assert len(_run(tmp_path, body, timeout_s=1.0)) == 6
+
+
+def test_interrupt_ends_the_process(tmp_path: Path) -> None:
+    script = tmp_path / "fake.py"
+    script.write_text(
+        'import json, os, time\nprint(json.dumps({"event": "pid", "pid": os.getpid()}), flush=True)\ntime.sleep(60)\n'
+    )
+    pids: list[int] = []
+
+    def interrupt(event: Event) -> None:
+        pids.append(event["pid"])
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_script(script, tmp_path / "job", blender=None, scratch=tmp_path, silence_timeout_s=20.0, on_event=interrupt)
+    _wait_until_gone(pids[0])
+
+
+def test_a_blender_program_gets_the_job_after_two_dashes(tmp_path: Path) -> None:
+    program = tmp_path / "blender"
+    program.write_text(
+        f'#!{sys.executable}\nimport json, sys\nprint(json.dumps({{"event": "e", "argv": sys.argv[1:]}}))\n'
+    )
+    program.chmod(0o755)
+    (event,) = _run(tmp_path, "", blender=str(program))
+    assert event["argv"][:3] == ["-b", "--factory-startup", "--disable-autoexec"]
+    assert event["argv"][-4:] == ["-P", str(tmp_path / "fake.py"), "--", str(tmp_path / "job.json")]
+
+
+def test_unknown_program_is_named(tmp_path: Path) -> None:
+    with pytest.raises(AssetError, match=r"render\.blender.*no-such-blender"):
+        _run(tmp_path, "", blender="no-such-blender")
