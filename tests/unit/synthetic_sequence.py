@@ -1,0 +1,32 @@
+"""The synthetic scene as a finished sequence on disk."""
+
+from pathlib import Path
+
+from synthetic_scene import Scene, make_scene
+
+from perpetua.formats import EXPORTERS
+from perpetua.seeding import StageSeed
+from perpetua.tracks.config import TracksConfig
+from perpetua.tracks.make import make_tracks
+from perpetua.tracks.types import SequenceTracks
+
+CONFIG = TracksConfig(count=200)
+
+
+def make_scene_tracks(scene: Scene, config: TracksConfig = CONFIG, seed: int = 5) -> SequenceTracks:
+    """Tracks of the synthetic scene."""
+    return make_tracks(scene.room, scene.actors, scene.cameras, scene.views, config, StageSeed(seed, 0, "tracks"))
+
+
+def write_scene(folder: Path) -> tuple[Scene, SequenceTracks]:
+    """Writes the synthetic scene in the benchmark layout."""
+    scene = make_scene()
+    tracks = make_scene_tracks(scene)
+    names = [{"object_index": thing.object_index, "category": thing.category} for thing in scene.room.objects]
+    names += [
+        {"object_index": actor.object_index, "category": "person", "actor": actor.actor} for actor in scene.actors
+    ]
+    EXPORTERS["tapvid_mv"]().write(
+        folder, scene.room, scene.actors, scene.cameras, scene.views, tracks, {"seed": 5, "objects": names}
+    )
+    return scene, tracks
