@@ -1,6 +1,5 @@
 """Takes one room through the stages: skips what is done, computes the rest, publishes the sequence."""
 
-import hashlib
 import json
 import shutil
 import time
@@ -14,8 +13,8 @@ from perpetua.pipeline import codec, store
 from perpetua.pipeline.events import Event, OnEvent
 from perpetua.pipeline.layout import OutputLayout
 from perpetua.pipeline.memory import PeakMemory
+from perpetua.pipeline.scripts import scripts_sha256
 from perpetua.pipeline.stages import AUDIT_FILE, SEQUENCE_FOLDER, STAGES, Stage, StageContext
-from perpetua.rendering.blender import SCRIPT_FOLDER
 from perpetua.seeding import StageSeed
 
 
@@ -72,7 +71,7 @@ class RoomRun:
     def _run_stage(self, stage: Stage) -> None:
         folder = store.StageFolder(self.layout.work_folder, stage.number, stage.name)
         key = self.keys[stage.name]
-        if folder.is_complete(key):
+        if folder.is_complete(key, stage.leftovers):
             self._report("stage_skipped", stage.name)
             return
         self._report("stage_started", stage.name)
@@ -80,7 +79,7 @@ class RoomRun:
         partial = folder.begin(key, stage.resumable)
         with PeakMemory() as memory:
             codec.save(stage.run(self._context(stage, partial)), partial)
-            outputs = store.output_hashes(partial)
+            outputs = store.output_hashes(partial, stage.leftovers)
         seconds = time.monotonic() - started
         folder.finish(
             store.Manifest(
@@ -96,6 +95,8 @@ class RoomRun:
                 libraries=store.library_versions(),
             )
         )
+        for name in stage.leftovers:
+            shutil.rmtree(folder.final / name, ignore_errors=True)
         self._report("stage_finished", stage.name, seconds=seconds, peak_memory_mb=memory.peak_mb)
 
     def _context(self, stage: Stage, partial: Path) -> StageContext:
@@ -148,11 +149,7 @@ def stage_keys(config: Config, seed: int, room: int, stages: tuple[Stage, ...] =
                 "seed": seed,
                 "room": room,
                 "upstream": {name: keys[name] for name in stage.needs},
-                "scripts": {name: _script_hash(name) for name in stage.scripts},
+                "scripts": scripts_sha256(stage.scripts),
             }
         )
     return keys
-
-
-def _script_hash(name: str) -> str:
-    return hashlib.sha256((SCRIPT_FOLDER / name).read_bytes()).hexdigest()

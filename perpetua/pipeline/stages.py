@@ -21,8 +21,8 @@ from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
 from perpetua.pipeline.record import sequence_record
 from perpetua.pipeline.store import write_json
-from perpetua.rendering.blender import SCRIPT_FOLDER
-from perpetua.rendering.render import render_views
+from perpetua.rendering.job import FRAME_FOLDER
+from perpetua.rendering.render import RENDER_SCRIPT, render_views
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.source import build_room
 from perpetua.rooms.types import Room
@@ -70,7 +70,12 @@ class StageContext:
 
 @dataclass(frozen=True)
 class Stage:
-    """One row of the table. ``section`` names the settings that the key depends on; ``version`` counts changes."""
+    """One row of the table.
+
+    ``section`` picks the settings that the key depends on; ``version`` counts changes of the code; ``scripts`` are
+    the Blender scripts it starts; a ``resumable`` stage goes on from what an interrupted run left; ``leftovers``
+    are names in its folder that only serve to go on, removed when it is finished.
+    """
 
     number: int
     name: str
@@ -80,6 +85,7 @@ class Stage:
     run: Callable[[StageContext], object]
     scripts: tuple[str, ...] = ()
     resumable: bool = False
+    leftovers: tuple[str, ...] = ()
 
 
 def _settings(*names: str) -> Callable[[Config], dict[str, Any]]:
@@ -220,8 +226,9 @@ STAGES = (
         ("room", "actors", "cameras"),
         _settings("render"),
         _render,
-        scripts=tuple(sorted(p.name for p in SCRIPT_FOLDER.glob("*.py") if p.name != "infinigen_room.py")),
+        scripts=(RENDER_SCRIPT.name,),
         resumable=True,
+        leftovers=(FRAME_FOLDER,),
     ),
     Stage(80, "tracks", 1, ("room", "actors", "cameras", "render"), _settings("tracks"), _tracks),
     Stage(

@@ -50,14 +50,11 @@ def file_sha256(path: Path) -> str:
         return hashlib.file_digest(handle, "sha256").hexdigest()
 
 
-def output_hashes(folder: Path) -> dict[str, str]:
-    """SHA-256 of every file below a folder but the manifest, by relative name."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
-    return {
-        path.relative_to(folder).as_posix(): file_sha256(path)
-        for path in files
-        if path.relative_to(folder).as_posix() not in (MANIFEST_FILE, KEY_FILE)
-    }
+def output_hashes(folder: Path, leftovers: tuple[str, ...] = ()) -> dict[str, str]:
+    """SHA-256 of every file below a folder but the manifest and ``leftovers``, by relative name."""
+    skipped = {MANIFEST_FILE, KEY_FILE, *leftovers}
+    files = sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+    return {path.as_posix(): file_sha256(folder / path) for path in files if path.parts[0] not in skipped}
 
 
 def library_versions() -> dict[str, str]:
@@ -86,10 +83,12 @@ class StageFolder:
         except (OSError, ValueError, TypeError):
             return None
 
-    def is_complete(self, key: str) -> bool:
+    def is_complete(self, key: str, leftovers: tuple[str, ...] = ()) -> bool:
         """Whether the stage is finished under this key and every output still has its hash."""
         manifest = self.manifest()
-        return manifest is not None and manifest.key == key and output_hashes(self.final) == manifest.outputs
+        if manifest is None or manifest.key != key:
+            return False
+        return output_hashes(self.final, leftovers) == manifest.outputs
 
     def begin(self, key: str, resumable: bool) -> Path:
         """An empty partial folder, or the one an interrupted run left under the same key."""
