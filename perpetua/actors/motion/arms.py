@@ -12,7 +12,7 @@ from perpetua.actors.types import Skeleton
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])
 # Palms of hanging arms turn a little to the back.
-_HANGING_TWIST_RAD = 0.3
+_HANGING_TWIST_RAD = 0.12
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def hanging_arm(
     # The collar takes a little of the drop, as it does when arms come down from a T-pose.
     collar = about_x(0.08 * drop_rad)
     shoulder = about_y(-forward_rad) @ about_x(0.92 * drop_rad) @ about_y(np.full(count, _HANGING_TWIST_RAD))
-    bend_rad = np.clip(elbow_rad + 0.55 * np.maximum(forward_rad, -0.2), 0.08, 1.2)
+    bend_rad = np.clip(elbow_rad + 0.4 * np.maximum(forward_rad, -0.2), 0.08, 1.2)
     elbow = about_z(-bend_rad)
     wrist = about_z(np.full(count, -0.12)) @ about_x(np.full(count, -0.05))
     if side == "right":
@@ -64,7 +64,7 @@ def reaching_arm(
     )
     length_m = float(np.linalg.norm(upper_m) + np.linalg.norm(lower_m))
     outward = np.array([1.0, 1.0 if side == "left" else -1.0, 1.0])
-    beat = np.sin(2.0 * np.pi * reach.swing_hz * time_s)[:, None] * np.array(reach.swing_along)
+    beat = np.sin(2.0 * np.pi * reach.swing_hz * time_s)[:, None] * np.array(reach.swing)
     wrist = (np.array(reach.wrist) + beat + sway) * outward * length_m
     shoulder_m = np.zeros_like(wrist)
     bones = solve_two_bones(
@@ -75,7 +75,10 @@ def reaching_arm(
         lower_m,
         np.array([-1.0, 0.0, 0.0]),
     )
-    return ArmRotations(world_from_chest, bones.world_from_upper, bones.world_from_lower, bones.world_from_lower)
+    # The forearm turns along its whole length: half of the roll shows between elbow and wrist.
+    half = about_y(np.full(len(time_s), 0.5 * reach.roll_rad))
+    elbow = bones.world_from_lower @ half
+    return ArmRotations(world_from_chest, bones.world_from_upper, elbow, elbow @ half)
 
 
 def _vector(values: Vector) -> Float64[np.ndarray, "3"]:

@@ -17,6 +17,11 @@ _DECISION_S = 0.02
 _LEAST_FOOT_GAP_M = 0.085
 _PASSING_GAP_M = 0.105
 _FOOT_LENGTH_M = 0.27
+# When in its stance a foot has the body over its ankle: before half, as the second half is spent rolling over the ball.
+_BODY_OVER_ANKLE = 0.41
+# A foot lands at most this far from under the body, in heights of the hip: a person who stops takes a shorter step.
+_FARTHEST_LANDING = 0.42
+_PACE_WINDOW_S = 0.8
 
 
 @dataclass(frozen=True)
@@ -90,6 +95,7 @@ class FootstepPlanner:
             timing = self._timing(time_s)
             side = self._next_side(standing, turn, time_s + timing.swing_s)
             if side is None:
+                turn = self._opening_side(time_s, turn)
                 time_s += _DECISION_S
                 continue
             old = standing[side]
@@ -100,8 +106,10 @@ class FootstepPlanner:
         return (*done[LEFT], standing[LEFT]), (*done[RIGHT], standing[RIGHT])
 
     def _timing(self, time_s: float) -> StepTiming:
-        ahead_s = time_s + np.linspace(0.0, 0.8, 9)
-        speed_mps, turn_rps = float(self._path.speed_mps(ahead_s).mean()), float(self._path.turn_rps(ahead_s).mean())
+        """Timing of a step that begins now."""
+        moments_s = time_s + np.linspace(0.0, _PACE_WINDOW_S, 9)
+        speed_mps = float(self._path.speed_mps(moments_s).mean())
+        turn_rps = float(self._path.turn_rps(moments_s).mean())
         return step_timing(speed_mps, turn_rps, self._hip_height_m, self._style.cycle_factor)
 
     def _next_side(self, standing: list[Plant], turn: int, land_s: float) -> int | None:
@@ -111,6 +119,14 @@ class FootstepPlanner:
         if self._need(standing[1 - turn], 1 - turn, land_s) >= 1.0:
             return 1 - turn
         return None
+
+    def _opening_side(self, time_s: float, otherwise: int) -> int:
+        """The foot that a standing person turns with first: the one on the inside of the turn."""
+        heading_rad = self._path.heading_rad(np.array([time_s, time_s + _PACE_WINDOW_S]))
+        turn_rad = float(heading_rad[1] - heading_rad[0])
+        if abs(turn_rad) < 0.15:
+            return otherwise
+        return LEFT if turn_rad > 0 else RIGHT
 
     def _need(self, plant: Plant, side: int, land_s: float) -> float:
         ideal = self._ideal(side, land_s)
@@ -131,8 +147,8 @@ class FootstepPlanner:
 
     def _step(self, side: int, old: Plant, other: Plant, lift_s: float, timing: StepTiming) -> Plant:
         land_s = lift_s + timing.swing_s
-        ideal = self._ideal(side, land_s + 0.5 * timing.support_s)
-        position_m = ideal.position_m.copy()
+        ideal = self._ideal(side, land_s + _BODY_OVER_ANKLE * timing.support_s)
+        position_m = self._within_reach(ideal.position_m, self._ideal(side, land_s).position_m)
         position_m[:2] += np.clip(self._rng.normal(0.0, 0.007, 2), -0.015, 0.015)
         yaw_rad = ideal.yaw_rad + float(np.clip(self._rng.normal(0.0, 0.02), -0.05, 0.05))
         outward = 1.0 if side == LEFT else -1.0
@@ -142,6 +158,13 @@ class FootstepPlanner:
         aside = outward * _axes(0.5 * (old.yaw_rad + yaw_rad))[1]
         dodge_m = _passing_room_m(old.position_m[:2], position_m[:2], other.position_m[:2], aside) * aside
         return Plant(position_m, yaw_rad, land_s, np.inf, dodge_m)
+
+    def _within_reach(
+        self, wanted_m: Float64[np.ndarray, "3"], under_body_m: Float64[np.ndarray, "3"]
+    ) -> Float64[np.ndarray, "3"]:
+        ahead_m = wanted_m - under_body_m
+        farthest_m = _FARTHEST_LANDING * self._hip_height_m
+        return under_body_m + ahead_m * min(1.0, farthest_m / max(float(np.linalg.norm(ahead_m)), 1e-9))
 
 
 def _axes(yaw_rad: float) -> tuple[Float64[np.ndarray, "2"], Float64[np.ndarray, "2"]]:

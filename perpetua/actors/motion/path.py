@@ -19,10 +19,10 @@ class RoutePath:
     def __init__(self, route: Route, fps: float) -> None:
         frames = len(route.heading_rad)
         self.end_s = (frames - 1) / fps
-        self._time_s = np.arange(frames) / fps
+        self._fps = fps
         self._knots = np.column_stack([route.position_m, np.unwrap(route.heading_rad)])
         degree = min(3, frames - 1)
-        self._spline = make_interp_spline(self._time_s, self._knots, k=degree) if degree > 0 else None
+        self._spline = make_interp_spline(np.arange(frames) / fps, self._knots, k=degree) if degree > 0 else None
         back = min(frames - 1, max(1, round(_END_VELOCITY_S * fps)))
         self._end_velocity = np.zeros((2, 4))
         if back > 0:
@@ -45,7 +45,10 @@ class RoutePath:
 
     def _evaluate(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, "N 4"]:
         inside_s = np.clip(time_s, 0.0, self.end_s)
-        values = self._knots[np.zeros(len(time_s), int)] if self._spline is None else self._spline(inside_s)
+        nearest = self._knots[np.rint(inside_s * self._fps).astype(int)]
+        values = nearest if self._spline is None else self._spline(inside_s)
+        # Floors have steps: a height between two frames is no height of the floor.
+        values[:, 2] = nearest[:, 2]
         before_s, after_s = np.minimum(time_s, 0.0), np.maximum(time_s - self.end_s, 0.0)
         return np.asarray(values + before_s[:, None] * self._end_velocity[0] + after_s[:, None] * self._end_velocity[1])
 
