@@ -14,3 +14,23 @@ class AuditConfig(Section):
     )
     depth_tolerance_m: float = Field(0.01, gt=0.0, description="depth agreement, constant part, metres")
     depth_tolerance_share: float = Field(0.01, ge=0.0, description="depth agreement, share of the depth")
+    point_depth_agreement: float = Field(
+        0.9, ge=0.0, le=1.0, description="the same where no surfaces are stored, only the points' own depths"
+    )
+    foreground_agreement: float = Field(
+        0.99,
+        ge=0.0,
+        le=1.0,
+        description="share of visible entries whose pixel must be foreground just when on an actor",
+    )
+    unexplained_hidden: float = Field(
+        0.02, ge=0.0, le=1.0, description="largest share of entries called hidden although depth shows their surface"
+    )
+    max_depth_m: float = Field(100.0, gt=0.0, description="largest depth of an indoor scene, metres")
+    rotation_error: float = Field(1e-5, gt=0.0, description="largest entry of R times its transpose minus identity")
+    surface_error_m: float = Field(1e-4, gt=0.0, description="largest distance of a track from its triangle, metres")
+    moving_m: float = Field(
+        0.05, gt=0.0, description="a track moves when two of its positions are so far apart, metres"
+    )
+    min_moving_share: float = Field(0.25, ge=0.0, le=1.0, description="least share of tracks that move")
+    max_moving_share: float = Field(0.35, ge=0.0, le=1.0, description="largest share of tracks that move")

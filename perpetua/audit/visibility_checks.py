@@ -1,0 +1,125 @@
+"""Checks of visibility against depth and foreground, at the pixel that each projection falls into."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool
+
+from perpetua.audit.config import AuditConfig
+from perpetua.audit.files import SequenceFiles
+from perpetua.audit.geometry import camera_centre_m, depth_of_planes, project_to_pixels
+from perpetua.audit.report import Check
+
+# A hidden point counts as unexplained only where depth shows its surface beyond doubt.
+SHARP = 0.1
+
+
+@dataclass
+class _Tally:
+    """Entries that were tested and those that failed, with the first failure in words."""
+
+    tested: int = 0
+    failed: int = 0
+    first: str = ""
+
+    def add(self, name: str, frame: int, tracks: np.ndarray, failed: np.ndarray, words: str) -> None:
+        self.tested += len(tracks)
+        self.failed += int(failed.sum())
+        if failed.any() and not self.first:
+            self.first = f"{name}[{frame}, {int(tracks[failed][0])}] {words}"
+
+    @property
+    def share(self) -> float:
+        return self.failed / max(self.tested, 1)
+
+
+@dataclass(frozen=True)
+class _Evidence:
+    """What one image shows of all tracks: each inside or not; expected and rendered depth, foreground at the pixel."""
+
+    inside: Bool[np.ndarray, " P"]
+    expected_m: np.ndarray
+    rendered_m: np.ndarray
+    foreground: Bool[np.ndarray, " P"]
+    facing: Bool[np.ndarray, " P"]
+
+
+def check_visibility(files: SequenceFiles, on_actor: Bool[np.ndarray, " P"] | None, bounds: AuditConfig) -> list[Check]:
+    """Visible entries lie on the image, at their own surface's rendered depth, on foreground just when on an actor;
+    hidden ones are not plainly in view. Without ``surface_xyz.npy`` a point's own depth stands for its surface's."""
+    outside, depth, foreground, hidden = _Tally(), _Tally(), _Tally(), _Tally()
+    has_surface = "surface_xyz.npy" in files.arrays
+    for view in files.views:
+        visibility, name = files.arrays[f"{view}/visibility.npy"], f"{view}/visibility.npy"
+        for frame in range(len(visibility)):
+            shown = _evidence(files, view, frame)
+            visible = np.asarray(visibility[frame])
+            tracks = np.flatnonzero(visible)
+            outside.add(name, frame, tracks, ~shown.inside[tracks], "is visible, and projects outside the image")
+            agrees = _agrees(shown, bounds, 1.0)
+            depth.add(name, frame, tracks, ~agrees[tracks], _depth_words(shown, tracks, agrees))
+            if on_actor is not None:
+                wrong = shown.foreground != on_actor
+                words = "is visible, and foreground_mask.npy disagrees with its object's kind"
+                foreground.add(name, frame, tracks, wrong[tracks], words)
+                tracks = np.flatnonzero(~visible & shown.inside)
+                plain = _agrees(shown, bounds, SHARP) & ~wrong & shown.facing
+                hidden.add(name, frame, tracks, plain[tracks], "is hidden, and depth shows its surface")
+    least = bounds.depth_agreement if has_surface else bounds.point_depth_agreement
+    checks = [
+        _bounded("visible on image", outside, 1.0),
+        _bounded("depth agreement" if has_surface else "depth agreement of points", depth, least),
+    ]
+    if on_actor is not None:
+        checks.append(_bounded("foreground agreement", foreground, bounds.foreground_agreement))
+    if on_actor is not None and has_surface:
+        checks.append(_bounded("hidden for a reason", hidden, 1.0 - bounds.unexplained_hidden))
+    return checks
+
+
+def _evidence(files: SequenceFiles, view: str, frame: int) -> _Evidence:
+    intrinsics = files.arrays[f"{view}/intrinsics.npy"]
+    pose = files.arrays[f"{view}/extrinsics_w2c.npy"][frame]
+    depth_m = files.arrays[f"{view}/depth.npy"][frame]
+    height, width = depth_m.shape
+    seen = project_to_pixels(intrinsics, pose, files.arrays["tracks_xyz.npy"][frame])
+    with np.errstate(invalid="ignore"):
+        inside = (
+            (seen[:, 2] > 0)
+            & (np.abs(seen[:, 0] - (width - 1) / 2) < width / 2)
+            & (np.abs(seen[:, 1] - (height - 1) / 2) < height / 2)
+        )
+    nearest = np.where(inside[:, None], np.floor(seen[:, :2] + 0.5), 0.0).astype(np.int64)
+    column, row = np.clip(nearest[:, 0], 0, width - 1), np.clip(nearest[:, 1], 0, height - 1)
+    expected_m, facing = seen[:, 2], np.ones(len(seen), bool)
+    if "surface_xyz.npy" in files.arrays:
+        triangle_m = np.asarray(files.arrays["surface_xyz.npy"][frame], np.float64)
+        expected_m = depth_of_planes(intrinsics, pose, triangle_m, column, row)
+        normal = np.cross(triangle_m[:, 1] - triangle_m[:, 0], triangle_m[:, 2] - triangle_m[:, 0])
+        facing = ((camera_centre_m(pose) - triangle_m[:, 0]) * normal).sum(axis=1) > 0
+    mask = files.arrays[f"{view}/foreground_mask.npy"][frame]
+    return _Evidence(inside, expected_m, np.asarray(depth_m[row, column], np.float64), mask[row, column], facing)
+
+
+def _agrees(shown: _Evidence, bounds: AuditConfig, factor: float) -> Bool[np.ndarray, " P"]:
+    with np.errstate(invalid="ignore"):
+        allowed_m = factor * (bounds.depth_tolerance_m + bounds.depth_tolerance_share * np.abs(shown.expected_m))
+        close = np.abs(shown.rendered_m - shown.expected_m) <= allowed_m
+    return np.asarray(shown.inside & (shown.rendered_m > 0) & close)
+
+
+def _depth_words(shown: _Evidence, tracks: np.ndarray, agrees: np.ndarray) -> str:
+    bad = tracks[~agrees[tracks]]
+    if len(bad) == 0:
+        return ""
+    return (
+        f"is visible, its surface is at {shown.expected_m[bad[0]]:.4f} m on that pixel's ray, "
+        f"and depth.npy has {shown.rendered_m[bad[0]]:.4f} m"
+    )
+
+
+def _bounded(name: str, tally: _Tally, least: float) -> Check:
+    share = 1.0 - tally.share
+    passed = share >= least
+    detail = "" if passed else f"{tally.failed} of {tally.tested} entries fail, first {tally.first}"
+    return Check(name, passed, share, f">= {least:g} of entries", detail)
