@@ -26,10 +26,33 @@ class MotionConfig(Section):
     )
 
 
+class ValidationConfig(Section):
+    """Hard limits on bodies in motion, and how closely they are looked at."""
+
+    max_slide_mps: float = Field(
+        0.04, gt=0.0, le=1.0, description="highest 95th percentile of the speed of a sole while it stands, m/s"
+    )
+    max_sole_penetration_m: float = Field(0.015, gt=0.0, le=0.2, description="deepest sole in the floor, metres")
+    max_floating_m: float = Field(0.02, gt=0.0, le=0.2, description="highest sole above the floor it stands on, metres")
+    max_scene_depth_m: float = Field(0.05, gt=0.0, le=1.0, description="deepest body in furniture or walls, metres")
+    min_actor_distance_m: float = Field(0.02, ge=0.0, le=1.0, description="least distance between two actors, metres")
+    max_path_error_m: float = Field(0.15, gt=0.0, le=1.0, description="farthest pelvis from its route, metres")
+    step_m: float = Field(
+        0.1, ge=0.0, le=0.3, description="what stands no higher than this on the floor is stepped over, metres"
+    )
+    frames: int = Field(
+        60, ge=2, le=100_000, description="frames in which bodies are checked against their surroundings"
+    )
+    vertices: int = Field(2000, ge=100, le=1_000_000, description="vertices of a body that are checked in a frame")
+
+
 class ActorsConfig(Section):
     """Who is in the room."""
 
     count: int = Field(4, ge=1, le=16, description="actors in a room")
     body: str = Field("anny", description="body model: anny")
+    youngest_years: float = Field(20.0, ge=18.0, le=90.0, description="age of the youngest people, years")
+    oldest_years: float = Field(70.0, ge=18.0, le=90.0, description="age of the oldest people, years")
     routes: RoutesConfig = Field(default_factory=RoutesConfig)
     motion: MotionConfig = Field(default_factory=MotionConfig)
+    validation: ValidationConfig = Field(default_factory=ValidationConfig)
