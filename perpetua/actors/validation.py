@@ -1,23 +1,18 @@
-"""Whether bodies in motion keep to the floor, to their routes, and out of the scene and of each other.
-
-Depth in the scene is measured from the inside out: each checked vertex belongs to the bone that it keeps closest to,
-and a surface between the two means that the vertex is on the wrong side of it. That needs no closed or consistently
-oriented furniture. Bones themselves are checked in the same way, which finds limbs that are wholly beyond a wall.
-"""
+"""Whether bodies in motion keep to the floor, to their routes, and out of the scene and of each other."""
 
 from dataclasses import asdict, dataclass
 from itertools import combinations
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Float64, Int64
 from scipy.spatial import cKDTree
 
 from perpetua.actors.config import ValidationConfig
 from perpetua.actors.motion.kinematics import CONTACT_JOINTS, contact_positions, joint_index, joint_positions
-from perpetua.actors.types import BODY_PARENTS, CONTACTS, ActorMesh, BodyMotion, Route, Skeleton
+from perpetua.actors.penetration import Obstacles, Worst, make_floor, make_obstacles, sampled_vertices, scene_depth
+from perpetua.actors.types import CONTACTS, ActorMesh, BodyMotion, Route, Skeleton
 from perpetua.errors import ActorError
-from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.raycast import Caster
 from perpetua.rooms.types import Room
 
@@ -25,16 +20,6 @@ from perpetua.rooms.types import Room
 _SOLE_RADIUS_M, _SOLE_THICKNESS_M = 0.06, 0.025
 # Floor is looked for from this far above the route.
 _FLOOR_SEARCH_M = 0.3
-_BONES = tuple((parent, joint) for joint, parent in enumerate(BODY_PARENTS) if parent >= 0)
-
-
-@dataclass(frozen=True)
-class Worst:
-    """The worst value in metres of a figure, the frame it occurs at, and what it concerns."""
-
-    value_m: float
-    frame: int
-    place: str
 
 
 @dataclass(frozen=True)
@@ -83,16 +68,6 @@ class ActorReport:
         }
 
 
-@dataclass(frozen=True)
-class _Surroundings:
-    """The room as obstacles (each face with its object's name) and as floor."""
-
-    obstacles: Caster
-    object_names: tuple[str, ...]
-    object_of_face: Int64[np.ndarray, " F"]
-    floor: Caster
-
-
 def validate_actors(
     actors: tuple[ActorMesh, ...],
     motions: tuple[BodyMotion, ...],
@@ -117,11 +92,12 @@ def validate_actors(
         ActorError: a limit is broken; names the actor, the frame, the thing and the value.
     """
     frames = np.unique(np.linspace(0, len(routes[0].heading_rad) - 1, config.frames).astype(np.int64))
-    surroundings = _surroundings(room, float(min(route.position_m[:, 2].min() for route in routes)) + config.step_m)
+    low_m = float(min(route.position_m[:, 2].min() for route in routes)) + config.step_m
+    obstacles, floor = make_obstacles(room, low_m), make_floor(room)
     people = list(zip(actors, motions, skeletons, routes, strict=True))
     report = ActorReport(
         tuple(
-            _figures(actor, motion, skeleton, route, surroundings, frames, fps, config)
+            _figures(actor, motion, skeleton, route, obstacles, floor, frames, fps, config)
             for actor, motion, skeleton, route in people
         ),
         tuple(_pair(first, second, frames, config.vertices) for first, second in combinations(actors, 2)),
@@ -163,43 +139,20 @@ def _check(worst: Worst, limit_m: float, name: str, key: str, verb: str, preposi
         )
 
 
-def _surroundings(room: Room, low_m: float) -> _Surroundings:
-    corners: list[np.ndarray] = []
-    floors: list[np.ndarray] = []
-    owners: list[np.ndarray] = []
-    for index, thing in enumerate(room.objects):
-        triangles_m = thing.mesh.vertices_m[thing.mesh.faces]
-        high = triangles_m[:, :, 2].max(axis=1) > low_m
-        corners.append(triangles_m[high])
-        owners.append(np.full(int(high.sum()), index, np.int64))
-        if thing.walkable:
-            floors.append(triangles_m)
-    return _Surroundings(
-        Caster(_soup(corners)),
-        tuple(thing.name for thing in room.objects),
-        np.concatenate(owners),
-        Caster(_soup(floors)),
-    )
-
-
-def _soup(triangles_m: list[np.ndarray]) -> TriMesh:
-    corners_m = np.concatenate([*triangles_m, np.zeros((0, 3, 3))]).reshape(-1, 3)
-    return TriMesh(corners_m, np.arange(len(corners_m), dtype=np.int32).reshape(-1, 3))
-
-
 def _figures(
     actor: ActorMesh,
     motion: BodyMotion,
     skeleton: Skeleton,
     route: Route,
-    surroundings: _Surroundings,
+    obstacles: Obstacles,
+    floor: Caster,
     frames: Int64[np.ndarray, " K"],
     fps: float,
     config: ValidationConfig,
 ) -> ActorFigures:
     joint_m = joint_positions(motion, skeleton)
     slide_mps = _slide_mps(actor, motion, skeleton, fps)
-    penetration, floating = _sole_figures(actor, motion, skeleton, route, surroundings.floor)
+    penetration, floating = _sole_figures(actor, motion, skeleton, route, floor)
     away_m = np.linalg.norm(motion.pelvis_m[:, :2] - route.position_m[:, :2], axis=1)
     farthest = int(away_m.argmax())
     return ActorFigures(
@@ -208,7 +161,7 @@ def _figures(
         float(np.percentile(slide_mps, 95)) if len(slide_mps) > 0 else 0.0,
         penetration,
         floating,
-        _scene_depth(actor, joint_m, surroundings, frames, config.vertices),
+        scene_depth(actor, joint_m, obstacles, frames, config.vertices),
         Worst(float(away_m[farthest]), farthest, "its route"),
     )
 
@@ -279,73 +232,9 @@ def _floor_z_m(floor: Caster, point_m: Float64[np.ndarray, "T 3"], route: Route)
     return np.where(near, found_m, route.position_m[:, 2])
 
 
-def _sample(actor: ActorMesh, count: int) -> Int64[np.ndarray, " K"]:
-    vertices = actor.vertices_m.shape[1]
-    return np.unique(np.linspace(0, vertices - 1, min(count, vertices)).astype(np.int64))
-
-
-def _anchors(
-    vertices_m: Float64[np.ndarray, "K P 3"], joint_m: Float64[np.ndarray, "K 22 3"]
-) -> tuple[Int64[np.ndarray, " P"], Float64[np.ndarray, " P"]]:
-    """For each vertex the bone that it keeps closest to over some frames, and where along it (0 to 1)."""
-    best_m = np.full(vertices_m.shape[1], np.inf)
-    bone_of = np.zeros(vertices_m.shape[1], np.int64)
-    share_of = np.zeros(vertices_m.shape[1])
-    for index, (parent, joint) in enumerate(_BONES):
-        start_m, along_m = joint_m[:, None, parent], (joint_m[:, joint] - joint_m[:, parent])[:, None]
-        share = np.sum((vertices_m - start_m) * along_m, axis=2) / np.maximum(np.sum(along_m**2, axis=2), 1e-12)
-        share = np.clip(share, 0.0, 1.0)
-        # A hand may hang beside a thigh at one frame: only what is never far belongs together.
-        away_m = np.linalg.norm(vertices_m - start_m - share[..., None] * along_m, axis=2).max(axis=0)
-        closer = away_m < best_m
-        best_m[closer], bone_of[closer], share_of[closer] = away_m[closer], index, share.mean(axis=0)[closer]
-    return bone_of, share_of
-
-
-def _scene_depth(
-    actor: ActorMesh,
-    joint_m: Float64[np.ndarray, "T 22 3"],
-    surroundings: _Surroundings,
-    frames: Int64[np.ndarray, " K"],
-    count: int,
-) -> Worst:
-    vertices_m = actor.vertices_m[np.ix_(frames, _sample(actor, count))].astype(np.float64)
-    few = np.unique(np.linspace(0, len(frames) - 1, 8).astype(np.int64))
-    bone_of, share_of = _anchors(vertices_m[few], joint_m[frames[few]])
-    parents, joints = np.array(_BONES).T
-    start_m, end_m = joint_m[np.ix_(frames, parents)], joint_m[np.ix_(frames, joints)]
-    anchor_m = start_m[:, bone_of] + share_of[None, :, None] * (end_m - start_m)[:, bone_of]
-    inside_m, outside_m = np.concatenate([anchor_m, start_m], axis=1), np.concatenate([vertices_m, end_m], axis=1)
-    depth_m, face = _depth_m(surroundings.obstacles, inside_m.reshape(-1, 3), outside_m.reshape(-1, 3))
-    deepest = int(depth_m.argmax())
-    if depth_m[deepest] == 0.0:
-        return Worst(0.0, int(frames[0]), "nothing")
-    thing = surroundings.object_names[surroundings.object_of_face[face[deepest]]]
-    return Worst(float(depth_m[deepest]), int(frames[deepest // inside_m.shape[1]]), f"'{thing}'")
-
-
-def _depth_m(
-    obstacles: Caster, inside_m: Float64[np.ndarray, "N 3"], outside_m: Float64[np.ndarray, "N 3"]
-) -> tuple[Float64[np.ndarray, " N"], Int64[np.ndarray, " N"]]:
-    """How far behind the plane of the first surface between them the outer points lie, and that surface's face."""
-    offset_m = outside_m - inside_m
-    length_m = np.linalg.norm(offset_m, axis=1)
-    direction = offset_m / np.maximum(length_m, 1e-9)[:, None]
-    direction[length_m < 1e-9] = (0.0, 0.0, 1.0)
-    hits = obstacles.first_hit(inside_m, direction)
-    crossed: Bool[np.ndarray, " N"] = hits.hit & (hits.distance_m < length_m)
-    corners_m = obstacles.mesh.vertices_m[obstacles.mesh.faces[hits.face[crossed]]]
-    normal = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-    depth_m = np.zeros(len(inside_m))
-    slope = np.abs(np.sum(normal * direction[crossed], axis=1))
-    depth_m[crossed] = (length_m - np.where(crossed, hits.distance_m, 0.0))[crossed] * slope
-    return depth_m, hits.face.astype(np.int64)
-
-
 def _pair(first: ActorMesh, second: ActorMesh, frames: Int64[np.ndarray, " K"], count: int) -> PairFigures:
     distance_m = np.empty(len(frames))
-    first_vertices, second_vertices = _sample(first, count), _sample(second, count)
+    first_vertices, second_vertices = sampled_vertices(first, count), sampled_vertices(second, count)
     for row, frame in enumerate(frames):
         tree = cKDTree(second.vertices_m[frame, second_vertices])
         distance_m[row] = tree.query(first.vertices_m[frame, first_vertices])[0].min()
