@@ -1,0 +1,4 @@
+"""Body models; importing this package enters them in ``BODY_MODELS``."""
+
+from perpetua.actors.bodies import anny as anny
+from perpetua.actors.bodies.source import BODY_MODELS as BODY_MODELS

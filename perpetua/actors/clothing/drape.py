@@ -1,0 +1,110 @@
+"""How cloth lies on a body: eased outward, taut between the places that carry it, wrinkled, hemmed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int32
+
+from perpetua.actors.clothing.piece import Surface
+from perpetua.actors.clothing.surface import averaging, border_edges, positive, vertex_normals
+
+_NORMAL_PASSES = 12
+
+
+@dataclass(frozen=True)
+class Drape:
+    """``gap_m`` is the least distance from the body, ``hold`` how strongly cloth keeps the ease it was cut with."""
+
+    gap_m: float
+    passes: int
+    hold: float
+
+
+def smooth_normals(surface: Surface) -> Float64[np.ndarray, "P 3"]:
+    """Outward directions without the body's small relief."""
+    mean = averaging(surface.faces, len(surface.vertices_m))
+    normal = vertex_normals(surface.vertices_m, surface.faces)
+    for _ in range(_NORMAL_PASSES):
+        normal = np.asarray(0.5 * (normal + mean @ normal))
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9))
+
+
+def draped(surface: Surface, ease_m: Float64[np.ndarray, " P"], how: Drape) -> Float64[np.ndarray, "P 3"]:
+    """Where the cloth cut from this body surface comes to lie.
+
+    Repeated averaging pulls the cloth straight across hollows (the small of the back, between the legs); wherever
+    that brings it nearer to the body than ``gap_m`` the body pushes it out again.
+    """
+    mean = averaging(surface.faces, len(surface.vertices_m))
+    normal = smooth_normals(surface)
+    wanted = surface.vertices_m + ease_m[:, None] * normal
+    cloth = wanted.copy()
+    for _ in range(how.passes):
+        cloth = np.asarray((1.0 - how.hold) * (0.4 * cloth + 0.6 * (mean @ cloth)) + how.hold * wanted)
+        gap = np.einsum("pa,pa->p", cloth - surface.vertices_m, normal)
+        cloth += np.maximum(how.gap_m - gap, 0.0)[:, None] * normal
+    return cloth
+
+
+def wrinkles(
+    template_m: Float64[np.ndarray, "P 3"], across: Float64[np.ndarray, "3"], rng: np.random.Generator
+) -> Float64[np.ndarray, " P"]:
+    """Soft folds in [-1, 1] that run mostly square to ``across``."""
+    total = np.zeros(len(template_m))
+    for _ in range(5):
+        direction = across + 0.45 * rng.standard_normal(3)
+        direction /= np.linalg.norm(direction)
+        bend = template_m @ rng.standard_normal(3)
+        wave_m = rng.uniform(0.055, 0.12)
+        total += np.sin(2.0 * np.pi * (template_m @ direction) / wave_m + 6.0 * bend + rng.uniform(0.0, 2.0 * np.pi))
+    return total / 5.0
+
+
+def hemmed(
+    surface: Surface, field_m: Float64[np.ndarray, " P"], width_m: float, thickness_m: float
+) -> tuple[Surface, Float64[np.ndarray, " P"], int]:
+    """The cloth with its cut edges turned in: a strip of inner side ``width_m`` wide along the zero line of the field.
+
+    Returns:
+        The surface, the field on its vertices, and how many of its faces (the first ones) are the outer side.
+    """
+    strip, strip_field = positive(surface, width_m - field_m)
+    normal = vertex_normals(strip.vertices_m, strip.faces)
+    inner_m = strip.vertices_m - thickness_m * normal
+    offset = len(surface.vertices_m)
+    outer_edges = _edges_on_line(surface.faces, field_m)
+    inner_edges = _edges_on_line(strip.faces, width_m - strip_field)
+    bridge = _bridge(surface, outer_edges, strip, inner_edges, offset)
+    faces = np.concatenate([surface.faces, strip.faces[:, ::-1] + offset, bridge]).astype(np.int32)
+    joined = Surface(
+        np.concatenate([surface.template_m, strip.template_m]),
+        np.concatenate([surface.vertices_m, inner_m]),
+        np.concatenate([surface.weights, strip.weights]),
+        faces,
+    )
+    return joined, np.concatenate([field_m, width_m - strip_field]), len(surface.faces)
+
+
+def _edges_on_line(faces: Int32[np.ndarray, "F 3"], field_m: Float64[np.ndarray, " P"]) -> Int32[np.ndarray, "E 2"]:
+    edges = border_edges(faces)
+    return edges[np.all(np.abs(field_m[edges]) < 1e-7, axis=1)]
+
+
+def _bridge(
+    outer: Surface,
+    outer_edges: Int32[np.ndarray, "E 2"],
+    inner: Surface,
+    inner_edges: Int32[np.ndarray, "E 2"],
+    offset: int,
+) -> Int32[np.ndarray, "F 3"]:
+    """Faces between an edge and its copy on the inner side; both have the same place on the template."""
+    places = {tuple(place): index for index, place in enumerate(inner.template_m.tolist())}
+    wanted = {tuple(edge) for edge in inner_edges.tolist()}
+    faces = []
+    for first, second in outer_edges.tolist():
+        a = places.get(tuple(outer.template_m[first].tolist()))
+        b = places.get(tuple(outer.template_m[second].tolist()))
+        if a is not None and b is not None and (a, b) in wanted:
+            faces.append((second, first, offset + a))
+            faces.append((second, offset + a, offset + b))
+    return np.array(faces, dtype=np.int32).reshape(-1, 3)
