@@ -1,0 +1,227 @@
+"""The camera stage: candidates drawn from the seed, optimised together; the best one that passes the audit wins."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64
+from scipy import ndimage
+
+from perpetua.actors.types import ActorMesh
+from perpetua.cameras.audit import CameraAudit, audit_paths
+from perpetua.cameras.bodies import ActorBounds, actor_bounds, bounds_at
+from perpetua.cameras.config import CamerasConfig
+from perpetua.cameras.optimise import Problem, Solution, optimise_paths, spline_basis
+from perpetua.cameras.sdf import signed_distance_field
+from perpetua.cameras.starts import draw_start
+from perpetua.cameras.types import CameraPath, SignedDistanceField
+from perpetua.cameras.wishes import ViewWish, draw_wishes, shown_points
+from perpetua.errors import CameraError
+from perpetua.geometry.mesh import join
+from perpetua.geometry.pinhole import Intrinsics
+from perpetua.geometry.raycast import Caster
+from perpetua.geometry.transforms import look_at
+from perpetua.rooms.types import Room
+from perpetua.seeding import StageSeed
+
+# The losses look at the paths this often; splines with a control point every 0.6 s do not change faster.
+RATE_HZ = 8.0
+LEAST_TIMES = 9
+FOCUS_SMOOTHING_S = 0.25
+
+
+@dataclass(frozen=True)
+class CameraPlan:
+    """The winning paths and how they came about; ``focus`` says whom each view is to show at each frame."""
+
+    paths: tuple[CameraPath, ...]
+    focus: Bool[np.ndarray, "C T A"]
+    wishes: tuple[ViewWish, ...]
+    audit: CameraAudit
+    terms: dict[str, float]
+    redraw: int
+    candidate: int
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What all candidates share."""
+
+    room: Room
+    actors: tuple[ActorMesh, ...]
+    bounds: ActorBounds
+    caster: Caster
+    field: SignedDistanceField
+    fps: float
+    width_px: int
+    height_px: int
+
+    @property
+    def times_s(self) -> Float64[np.ndarray, " T"]:
+        return np.arange(self.bounds.axis_m.shape[1]) / self.fps
+
+
+def plan_cameras(
+    room: Room,
+    actors: tuple[ActorMesh, ...],
+    config: CamerasConfig,
+    frames: int,
+    fps: float,
+    width_px: int,
+    height_px: int,
+    seed: StageSeed,
+) -> tuple[CameraPath, ...]:
+    """The paths of ``make_camera_plan``, which says more."""
+    return make_camera_plan(room, actors, config, frames, fps, width_px, height_px, seed).paths
+
+
+def make_camera_plan(
+    room: Room,
+    actors: tuple[ActorMesh, ...],
+    config: CamerasConfig,
+    frames: int,
+    fps: float,
+    width_px: int,
+    height_px: int,
+    seed: StageSeed,
+) -> CameraPlan:
+    """Moving cameras that show the actors from clearly different directions and touch nothing.
+
+    Args:
+        room: all its meshes are obstacles, whether opaque or not.
+        actors: their meshes, with ``frames`` frames each.
+        config: wishes, limits, weights and effort.
+        frames: length of the sequence, at least 2.
+        fps: frames per second.
+        width_px: image width.
+        height_px: image height.
+        seed: what everything is drawn from.
+
+    Raises:
+        CameraError: no candidate of any redraw passes the audit; the message names the rules broken by the best.
+    """
+    _require_inputs(actors, frames)
+    caster = Caster(join([thing.mesh for thing in room.objects]))
+    field = signed_distance_field(room, caster, config.voxel_m)
+    scene = _Scene(room, actors, actor_bounds(actors), caster, field, fps, width_px, height_px)
+    nearest: CameraAudit | None = None
+    for redraw in range(config.max_redraws + 1):
+        wishes = [
+            draw_wishes(seed, redraw, candidate, scene.bounds, room.height_m, frames / fps, config)
+            for candidate in range(config.candidates)
+        ]
+        problem = _pose_problem(scene, wishes, config, seed, redraw)
+        solution = optimise_paths(problem, config)
+        for candidate in np.argsort(solution.loss, kind="stable"):
+            paths = _paths(scene, wishes[candidate], solution, int(candidate))
+            focus = np.stack([wish.focus.members(scene.times_s, len(actors)) for wish in wishes[candidate]])
+            audit = audit_paths(paths, focus, room, actors, caster, fps, config)
+            if audit.passed:
+                terms = {name: float(values[candidate]) for name, values in solution.terms.items()}
+                return CameraPlan(paths, focus, wishes[candidate], audit, terms, redraw, int(candidate))
+            if nearest is None or len(audit.violations) < len(nearest.violations):
+                nearest = audit
+    assert nearest is not None
+    raise CameraError(
+        f"no camera paths in '{room.name}' keep every rule after {config.max_redraws} redraws "
+        f"(cameras.max_redraws); the best set breaks: " + "; ".join(each.message for each in nearest.violations)
+    )
+
+
+def _require_inputs(actors: tuple[ActorMesh, ...], frames: int) -> None:
+    if not actors:
+        raise CameraError("cameras need at least one actor to look at; there are 0: raise actors.count")
+    if frames < 2:
+        raise CameraError(f"moving cameras need at least 2 frames, not {frames}: raise sequence.frames")
+    for actor in actors:
+        if len(actor.vertices_m) != frames:
+            raise CameraError(
+                f"actor {actor.actor} has {len(actor.vertices_m)} frames where the sequence has {frames}: "
+                "make the actors again for this length"
+            )
+
+
+def _pose_problem(
+    scene: _Scene, wishes: list[tuple[ViewWish, ...]], config: CamerasConfig, seed: StageSeed, redraw: int
+) -> Problem:
+    frames = len(scene.times_s)
+    duration_s = float(scene.times_s[-1])
+    times = max(LEAST_TIMES, int(np.ceil(duration_s * RATE_HZ)) + 1)
+    sampled_s = np.linspace(0.0, duration_s, times)
+    starts, focus = [], []
+    for candidate, views in enumerate(wishes):
+        for wish in views:
+            rng = seed.stream("start", redraw, candidate, wish.camera)
+            knots_m = draw_start(rng, wish, scene.field, scene.caster, scene.bounds, duration_s, config)
+            starts.append(_interpolate(knots_m, times))
+            focus.append(_interpolate(_focus_m(scene, wish), times))
+    shape = (len(wishes), config.count)
+
+    def each(values: list[np.ndarray]) -> np.ndarray:
+        return np.stack(values).reshape(*shape, *values[0].shape)
+
+    flat = [wish for views in wishes for wish in views]
+    aspect = scene.height_px / scene.width_px
+    return Problem(
+        step_s=duration_s / (times - 1),
+        start_m=each(starts),
+        focus_m=each(focus),
+        sway_m=each([wish.sway.at(sampled_s)[:, :3] for wish in flat]),
+        focus_weight=each([wish.focus.weights(sampled_s, len(scene.actors)) for wish in flat]),
+        point_weight=each([shown_points(wish) for wish in flat]),
+        tan_half_fov=each([np.tan(0.5 * wish.fov_rad) * np.array([1.0, aspect]) for wish in flat]),
+        size_range=each([np.array([wish.framing.least_size, wish.framing.most_size]) for wish in flat]),
+        height_band_m=each([np.array(wish.height_m) for wish in flat]),
+        speed_mps=each([np.array(wish.speed_mps) for wish in flat]),
+        bounds=bounds_at(scene.bounds, np.linspace(0.0, frames - 1.0, times)),
+        field=scene.field,
+    )
+
+
+def _focus_m(scene: _Scene, wish: ViewWish) -> Float64[np.ndarray, "T 3"]:
+    """The point a view looks at: its focus's chests, smoothed so that steps do not shake the camera."""
+    weight = wish.focus.weights(scene.times_s, len(scene.actors))
+    point_m = np.einsum("ta,ati->ti", weight, scene.bounds.chest_m)
+    return np.asarray(ndimage.gaussian_filter1d(point_m, FOCUS_SMOOTHING_S * scene.fps, axis=0, mode="nearest"))
+
+
+def _interpolate(points_m: Float64[np.ndarray, "M 3"], count: int) -> Float64[np.ndarray, "T 3"]:
+    """``count`` points evenly spaced in time along points that are evenly spaced in time."""
+    given, wanted = np.linspace(0.0, 1.0, len(points_m)), np.linspace(0.0, 1.0, count)
+    return np.stack([np.interp(wanted, given, points_m[:, i]) for i in range(3)], axis=1)
+
+
+def _paths(scene: _Scene, wishes: tuple[ViewWish, ...], solution: Solution, candidate: int) -> tuple[CameraPath, ...]:
+    times_s = scene.times_s
+    basis = spline_basis(np.linspace(0.0, 1.0, len(times_s)), float(times_s[-1]))
+    paths = []
+    for view, wish in enumerate(wishes):
+        sway = wish.sway.at(times_s)
+        position_m = basis @ solution.position_control_m[candidate, view] + sway[:, :3]
+        target_m = _focus_m(scene, wish) + basis @ solution.offset_control_m[candidate, view]
+        intrinsics = Intrinsics.centred(scene.width_px, scene.height_px, wish.fov_rad)
+        paths.append(CameraPath(wish.camera, _swayed(position_m, target_m, sway[:, 3:]), intrinsics))
+    return tuple(paths)
+
+
+def _swayed(
+    position_m: Float64[np.ndarray, "T 3"],
+    target_m: Float64[np.ndarray, "T 3"],
+    yaw_pitch_roll_rad: Float64[np.ndarray, "T 3"],
+) -> Float64[np.ndarray, "T 4 4"]:
+    """Level cameras that look at targets, turned by small angles about their own down, right and forward axes."""
+    world_from_level = look_at(position_m, target_m)
+    yaw, pitch, roll = yaw_pitch_roll_rad.T
+    level_from_camera = np.zeros((len(position_m), 4, 4))
+    level_from_camera[:, 3, 3] = 1.0
+    level_from_camera[:, :3, :3] = _rotation(1, yaw) @ _rotation(0, pitch) @ _rotation(2, roll)
+    return np.asarray(world_from_level @ level_from_camera)
+
+
+def _rotation(axis: int, angle_rad: Float64[np.ndarray, " T"]) -> Float64[np.ndarray, "T 3 3"]:
+    matrix = np.zeros((len(angle_rad), 3, 3))
+    following, last = (axis + 1) % 3, (axis + 2) % 3
+    matrix[:, axis, axis] = 1.0
+    matrix[:, following, following] = matrix[:, last, last] = np.cos(angle_rad)
+    matrix[:, last, following] = np.sin(angle_rad)
+    matrix[:, following, last] = -np.sin(angle_rad)
+    return matrix
