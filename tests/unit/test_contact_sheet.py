@@ -1,0 +1,82 @@
+"""The pictures show what the sequence holds, where it is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from synthetic_sequence import write_scene
+
+from perpetua.audit.contact_sheet import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX, write_contact_sheet
+from perpetua.audit.drawing import BACKGROUND, Canvas, depth_colours
+from perpetua.audit.plan_view import write_plan_view
+from perpetua.errors import SequenceFormatError
+
+
+@pytest.fixture(scope="module")
+def sequence(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("pictures") / "sequence"
+    write_scene(folder)
+    return folder
+
+
+def cell(sheet: np.ndarray, row: int, column: int) -> np.ndarray:
+    height = CELL_WIDTH_PX * 72 // 96
+    top, left = HEADING_PX + row * (height + GAP_PX), MARGIN_PX + column * (CELL_WIDTH_PX + GAP_PX)
+    return sheet[top : top + height, left : left + CELL_WIDTH_PX]
+
+
+def test_each_view_has_a_row_of_frames_and_a_row_of_depth(sequence: Path, tmp_path: Path) -> None:
+    write_contact_sheet(sequence, tmp_path / "sheet.png", times=3)
+    sheet = np.asarray(Image.open(tmp_path / "sheet.png").convert("RGB"))
+    height = CELL_WIDTH_PX * 72 // 96
+    assert sheet.shape == (HEADING_PX + 6 * (height + GAP_PX), MARGIN_PX + 3 * (CELL_WIDTH_PX + GAP_PX), 3)
+    for row in range(6):
+        for column in range(3):
+            assert len(np.unique(cell(sheet, row, column).reshape(-1, 3), axis=0)) > 50
+
+
+def test_frames_are_the_sequences_frames_with_marks_on_them(sequence: Path, tmp_path: Path) -> None:
+    from perpetua.formats.reader import read_sequence
+
+    write_contact_sheet(sequence, tmp_path / "sheet.png", times=2)
+    sheet = np.asarray(Image.open(tmp_path / "sheet.png").convert("RGB"))
+    view = read_sequence(sequence).views[1]
+    for column, frame in enumerate((0, 5)):
+        plain = np.asarray(Image.fromarray(view.image(frame)).resize((320, 240), Image.Resampling.BICUBIC)).astype(int)
+        differs = np.abs(cell(sheet, 2, column).astype(int) - plain).max(axis=2) > 20
+        assert 0.002 < differs.mean() < 0.3
+
+
+def test_more_times_than_frames_shows_each_frame_once(sequence: Path, tmp_path: Path) -> None:
+    write_contact_sheet(sequence, tmp_path / "sheet.png", times=24)
+    with Image.open(tmp_path / "sheet.png") as sheet:
+        assert sheet.width == MARGIN_PX + 6 * (CELL_WIDTH_PX + GAP_PX)
+
+
+def test_dots_lie_on_their_pixels() -> None:
+    canvas = Canvas(np.zeros((9, 9, 3), np.uint8))
+    canvas.dot(np.array([3.0, 5.0]), (255, 255, 255), 1.2)
+    level = np.asarray(canvas.picture()).astype(float).sum(axis=2)
+    rows, columns = np.mgrid[:9, :9]
+    assert (level * columns).sum() / level.sum() == pytest.approx(3.0, abs=0.15)
+    assert (level * rows).sum() / level.sum() == pytest.approx(5.0, abs=0.15)
+
+
+def test_near_is_brighter_than_far_and_nothing_is_black() -> None:
+    level = depth_colours(np.array([[1.0, 2.0, 4.0, 0.0]]), 1.0, 4.0).astype(int).sum(axis=2)[0]
+    assert level[0] > level[1] > level[2] > level[3] == 0
+
+
+def test_plan_shows_cameras_and_routes(sequence: Path, tmp_path: Path) -> None:
+    write_plan_view(sequence, tmp_path / "plan.png")
+    plan = np.asarray(Image.open(tmp_path / "plan.png").convert("RGB")).astype(int)
+    saturated = (plan.max(axis=2) - plan.min(axis=2)) > 120
+    white = (plan > 230).all(axis=2)
+    assert saturated.sum() > 300 and white.sum() > 300
+    assert tuple(plan[0, 0]) == BACKGROUND
+
+
+def test_a_folder_without_sequence_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(SequenceFormatError, match="tracks_xyz"):
+        write_contact_sheet(tmp_path, tmp_path / "sheet.png")
