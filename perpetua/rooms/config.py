@@ -1,6 +1,6 @@
 """Settings of the room stage."""
 
-from typing import Literal, Self
+from typing import Literal
 
 from pydantic import Field, model_validator
 
@@ -30,7 +30,7 @@ class RoomsConfig(Section):
     max_triangles: int = Field(3_000_000, ge=1000, description="triangles allowed in one room")
 
     @model_validator(mode="after")
-    def _check_order(self) -> Self:
+    def _check_order(self) -> "RoomsConfig":
         for low, high in (("min_side_m", "max_side_m"), ("min_height_m", "max_height_m")):
             if getattr(self, low) > getattr(self, high):
                 raise ValueError(f"{low} must not exceed {high}: {getattr(self, low)} > {getattr(self, high)}")
