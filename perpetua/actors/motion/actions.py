@@ -73,7 +73,7 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(_stem(word) for word in text.split())
 
 
-_PHONE = HandReach((0.24, 0.0, 0.16), (0.25, 0.55, -1.0), roll_rad=-1.2)
+_PHONE = HandReach((0.19, 0.03, 0.17), (0.3, 0.6, -1.0), roll_rad=-1.2)
 _SCREEN = HandReach((0.47, -0.22, -0.12), (-0.2, 0.45, -1.0), roll_rad=-0.8)
 _WAVE = HandReach((0.24, 0.32, 0.26), (0.0, 1.0, -0.8), swing=(0.0, 0.13, 0.0), swing_hz=1.5)
 _POINT = HandReach((0.93, 0.1, 0.02), (-0.3, 0.6, -1.0))

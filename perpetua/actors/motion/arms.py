@@ -11,8 +11,9 @@ from perpetua.actors.motion.rotations import about_x, about_y, about_z, rotate
 from perpetua.actors.types import Skeleton
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])
-# Palms of hanging arms turn a little to the back.
 _HANGING_TWIST_RAD = 0.12
+# Palms of hanging arms turn a little to the back, half of it in the forearm and half at the wrist.
+_PRONATION_RAD = 0.2
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,8 @@ def hanging_arm(
     collar = about_x(0.08 * drop_rad)
     shoulder = about_y(-forward_rad) @ about_x(0.92 * drop_rad) @ about_y(np.full(count, _HANGING_TWIST_RAD))
     bend_rad = np.clip(elbow_rad + 0.4 * np.maximum(forward_rad, -0.2), 0.08, 1.2)
-    elbow = about_z(-bend_rad)
-    wrist = about_z(np.full(count, -0.12)) @ about_x(np.full(count, -0.05))
+    elbow = about_z(-bend_rad) @ about_y(np.full(count, _PRONATION_RAD))
+    wrist = about_z(np.full(count, -0.12)) @ about_x(np.full(count, -0.05)) @ about_y(np.full(count, _PRONATION_RAD))
     if side == "right":
         collar, shoulder, elbow, wrist = (_mirrored(part) for part in (collar, shoulder, elbow, wrist))
     world_from_collar = world_from_chest @ collar

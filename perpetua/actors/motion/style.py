@@ -43,7 +43,7 @@ def draw_gait_style(rng: np.random.Generator, hip_half_width_m: float) -> GaitSt
         phase_s=float(rng.uniform(0.0, 1.2)),
         first_side=int(rng.integers(2)),
         toe_out_rad=around(0.12, 0.04),
-        walk_half_width_m=max(0.045, around(0.6, 0.06) * hip_half_width_m),
+        walk_half_width_m=max(0.045, around(0.67, 0.06) * hip_half_width_m),
         stand_half_width_m=max(0.07, around(1.15, 0.12) * hip_half_width_m),
         clearance_m=around(0.025, 0.004),
         arm_swing_rad_per_m=around(0.46, 0.07),
