@@ -1,0 +1,170 @@
+"""The Infinigen source without Infinigen: what it asks for, reads back, and does when things go wrong."""
+
+import importlib.util
+import json
+import sys
+import time
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from perpetua.errors import EnvironmentSetupError, RoomError
+from perpetua.navigation.config import NavigationConfig
+from perpetua.rooms import infinigen
+from perpetua.rooms.acceptance import RoomRejected
+from perpetua.rooms.config import RoomsConfig
+from perpetua.rooms.infinigen import InfinigenRooms, draw_dimensions_m
+from perpetua.rooms.source import build_room
+from perpetua.seeding import StageSeed
+
+SEED = StageSeed(7, 0, "room")
+CONFIG = RoomsConfig(timeout_s=10.0)
+
+# A tetrahedron and a square floor, written as the Blender script writes them.
+WRITE_ROOM = """
+import json, sys
+from pathlib import Path
+import numpy as np
+job = json.loads(Path(sys.argv[1]).read_text())
+folder = Path(job["folder"])
+vertices_m = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1],
+                       [-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]], np.float64)
+faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 1, 2], [0, 2, 3]], np.int32)
+np.savez(folder / "meshes.npz", vertices_m=vertices_m, faces=faces, vertex_start=[0, 4, 8], face_start=[0, 4, 6])
+objects = [
+    {"object_index": 1, "name": "bed", "category": "bed", "walkable": False, "opaque": True},
+    {"object_index": 2, "name": "room_floor_00", "category": "floor", "walkable": True, "opaque": True},
+]
+square = [[-3, -3], [3, -3], [3, 3], [-3, 3]]
+table = {"kind": job["kind"], "floor_polygon_m": square, "height_m": job["dimensions_m"][2], "objects": objects}
+(folder / "room.json").write_text(json.dumps(table))
+(folder / "room.blend").write_bytes(json.dumps(job).encode())
+"""
+
+
+def _use_script(monkeypatch: pytest.MonkeyPatch, folder: Path, code: str) -> None:
+    script = folder / "script.py"
+    script.write_text(code, encoding="utf-8")
+    monkeypatch.setattr(infinigen, "SCRIPT", script)
+
+
+def _categories() -> ModuleType:
+    path = Path(infinigen.SCRIPT).parent / "infinigen_categories.py"
+    specification = importlib.util.spec_from_file_location("infinigen_categories", path)
+    assert specification is not None and specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(
+    ("name", "category"),
+    [
+        ("room_floor_00", "floor"),
+        ("room_wall_corners_00", "wall"),
+        ("room_wall_back_05", "wall"),
+        ("room_ceiling_back_00", "ceiling"),
+        ("kitchen_cabinet_00.003", "kitchen_cabinet"),
+        ("kitchen_upper_cabinet_02", "kitchen_cabinet"),
+        ("kitchen_countertop_00.001", "kitchen_counter"),
+        ("sofa_01", "sofa"),
+        ("bed.001", "bed"),
+        ("bedside_table.002", "bedside_table"),
+        ("bedside_lamp", "table_lamp"),
+        ("_table_coffee_legged_rand", "coffee_table"),
+        ("cushion_bed_pillow_rand.001", "pillow"),
+        ("dining_chair_03", "chair"),
+        ("desk_chair_00", "desk_chair"),
+        ("desk_00", "desk"),
+        ("storage_rand.004", "cabinet"),
+        ("bathroom_sink_00", "sink"),
+        ("rug_rand", "rug"),
+        ("uv_sphere_rand_effect_screw_ring.007", "clutter"),
+        ("bedazzled_thing", "clutter"),
+    ],
+)
+def test_names_become_plain_nouns(name: str, category: str) -> None:
+    assert _categories().category_of(name) == category
+
+
+def test_dimensions_stay_in_their_limits_and_follow_the_seed() -> None:
+    config = RoomsConfig(min_side_m=5.0, max_side_m=6.0, min_height_m=2.5, max_height_m=2.7)
+    draws = [draw_dimensions_m(config, StageSeed(7, room, "room").stream("infinigen", 0)) for room in range(200)]
+    low, high = np.min(draws, axis=0), np.max(draws, axis=0)
+    assert (low >= [5.0, 5.0, 2.5]).all() and (high <= [6.0, 6.0, 2.7]).all()
+    assert (high - low > [0.9, 0.9, 0.18]).all()
+    assert draws[3] == draw_dimensions_m(config, StageSeed(7, 3, "room").stream("infinigen", 0))
+
+
+def test_the_room_comes_back_as_the_script_wrote_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    _use_script(monkeypatch, tmp_path, WRITE_ROOM)
+    room = InfinigenRooms().make("bedroom", CONFIG, SEED, 0, tmp_path)
+    assert [(thing.object_index, thing.category, thing.walkable) for thing in room.objects] == [
+        (1, "bed", False),
+        (2, "floor", True),
+    ]
+    assert np.array_equal(room.objects[0].mesh.faces, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    floor = room.objects[1].mesh
+    assert np.array_equal(floor.vertices_m, [[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]])
+    assert np.array_equal(floor.faces, [[0, 1, 2], [0, 2, 3]])
+    assert room.kind == "bedroom" and room.next_object_index == 3
+    # The .blend is all that stays, beside the room.
+    assert room.blend_path == tmp_path / "room.blend"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["room.blend", "script.py"]
+
+
+def test_the_job_depends_on_seed_and_attempt_alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    _use_script(monkeypatch, tmp_path, WRITE_ROOM)
+
+    def job(folder: str, seed: StageSeed, attempt: int) -> dict[str, object]:
+        scratch = tmp_path / folder
+        scratch.mkdir()
+        room = InfinigenRooms().make("bedroom", CONFIG, seed, attempt, scratch)
+        assert room.blend_path is not None
+        asked = json.loads(room.blend_path.read_text())
+        return {key: asked[key] for key in ("kind", "seed", "dimensions_m")}
+
+    first = job("a", SEED, 0)
+    assert job("b", SEED, 0) == first
+    assert job("c", SEED, 1) != first
+    assert job("d", StageSeed(7, 1, "room"), 0) != first
+
+
+def test_a_crash_is_a_rejection_with_the_last_lines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    _use_script(monkeypatch, tmp_path, "raise ValueError('no place for the bathtub')")
+    with pytest.raises(RoomRejected, match="no place for the bathtub") as rejection:
+        InfinigenRooms().make("bathroom", CONFIG, SEED, 0, tmp_path)
+    assert rejection.value.rule == "crash"
+
+
+def test_a_hanging_generator_is_stopped(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    _use_script(monkeypatch, tmp_path, "import time; time.sleep(60)")
+    begin = time.monotonic()
+    with pytest.raises(RoomRejected, match=r"rooms\.timeout_s = 1 ") as rejection:
+        InfinigenRooms().make("kitchen", CONFIG.model_copy(update={"timeout_s": 1.0}), SEED, 0, tmp_path)
+    assert rejection.value.rule == "timeout"
+    assert time.monotonic() - begin < 20.0
+
+
+def test_missing_infinigen_names_the_extra(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "infinigen2", None)
+    with pytest.raises(EnvironmentSetupError, match=r"perpetua\[infinigen\]"):
+        InfinigenRooms().make("kitchen", CONFIG, SEED, 0, tmp_path)
+
+
+def test_redraws_are_counted_by_reason(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    # The script's room has a bed alone, which makes no kitchen.
+    _use_script(monkeypatch, tmp_path, WRITE_ROOM)
+    config = RoomsConfig(kinds=("kitchen",), max_redraws=2)
+    with pytest.raises(RoomError, match=r"3 draws of a kitchen.*furniture \(3 x\)"):
+        build_room(config, NavigationConfig(), SEED, tmp_path)
+
+
+def test_a_rejected_draw_is_followed_by_another(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    flag = f"from pathlib import Path\nflag = Path({str(tmp_path / 'flag')!r})\n"
+    fail_once = flag + "if not flag.exists():\n    flag.touch()\n    raise SystemExit('first draw')\n"
+    _use_script(monkeypatch, tmp_path, fail_once + WRITE_ROOM)
+    room = build_room(RoomsConfig(kinds=("bedroom",)), NavigationConfig(), SEED, tmp_path)
+    assert room.kind == "bedroom"
