@@ -20,7 +20,7 @@ _FOOT_LENGTH_M = 0.27
 # When in its stance a foot has the body over its ankle: before half, as the second half is spent rolling over the ball.
 _BODY_OVER_ANKLE = 0.41
 # A foot lands at most this far from under the body, in heights of the hip: a person who stops takes a shorter step.
-_FARTHEST_LANDING = 0.42
+_FARTHEST_LANDING = 0.47
 _PACE_WINDOW_S = 0.8
 
 

@@ -15,7 +15,7 @@ SIDES = ("left", "right")
 # A knee keeps about nine degrees of bend.
 _REACH_SHARE = 0.9965
 # The pelvis comes down before a leg is fully stretched, so that it never has to jerk.
-_FORESIGHT_S = 0.07
+_FORESIGHT_S = 0.09
 
 
 @dataclass(frozen=True)
