@@ -141,6 +141,8 @@ def _add_panel(power_w: float, dimensions_m: list[float]) -> None:
     panel.energy = power_w
     thing = bpy.data.objects.new("ceiling_panel", panel)
     thing.location = (0.0, 0.0, dimensions_m[2] - 0.1)
+    # It stands for light from nowhere in particular, so it must not mirror in a polished floor.
+    thing.visible_glossy = thing.visible_camera = False
     bpy.context.scene.collection.objects.link(thing)
 
 

@@ -1,0 +1,138 @@
+"""One real Infinigen room, made twice: the same bits, plain and opaque, exactly what its .blend renders."""
+
+import hashlib
+import json
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+from perpetua.navigation.config import NavigationConfig
+from perpetua.navigation.grid import build_nav_grid
+from perpetua.rooms.acceptance import check_room
+from perpetua.rooms.config import RoomsConfig
+from perpetua.rooms.infinigen import InfinigenRooms
+from perpetua.rooms.types import Room
+from perpetua.seeding import StageSeed
+
+pytestmark = [pytest.mark.blender, pytest.mark.infinigen, pytest.mark.slow]
+
+CONFIG = RoomsConfig(kinds=("bathroom",), min_side_m=5.0, max_side_m=6.0)
+SEED = StageSeed(4, 0, "room")
+
+# Opens a .blend as the render stage does, and says what is in it.
+INSPECT = """
+import json, sys
+import bpy, numpy as np
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1], load_ui=False, use_scripts=False)
+things = {}
+for thing in bpy.context.scene.objects:
+    if thing.type == "MESH":
+        mesh = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        mesh.calc_loop_triangles()
+        corners = [[thing.matrix_world @ mesh.vertices[i].co for i in face.vertices] for face in mesh.loop_triangles]
+        corners = np.array(corners, np.float64).reshape(-1, 3)
+        things[thing.pass_index] = {
+            "name": thing.name, "triangles": len(mesh.loop_triangles), "modifiers": len(thing.modifiers),
+            "particles": len(thing.particle_systems), "hidden": thing.hide_render, "parent": thing.parent is not None,
+            "centre": corners.mean(0).tolist(), "low": corners.min(0).tolist(), "high": corners.max(0).tolist(),
+        }
+shaders = set()
+for tree in [m.node_tree for m in bpy.data.materials if m.node_tree] + list(bpy.data.node_groups):
+    for node in tree.nodes:
+        shaders.add(node.type)
+        if node.type == "BSDF_PRINCIPLED":
+            alpha, transmission = node.inputs["Alpha"], node.inputs["Transmission Weight"]
+            if alpha.is_linked or alpha.default_value < 1 or transmission.is_linked or transmission.default_value > 0:
+                shaders.add("SEE_THROUGH")
+answer = {
+    "things": things, "shaders": sorted(shaders),
+    "other": sorted({thing.type for thing in bpy.data.objects} - {"MESH", "LIGHT"}),
+    "displacement": sorted({material.displacement_method for material in bpy.data.materials}),
+    "lamp_w": sum(lamp.energy for lamp in bpy.data.lights if lamp.type != "SUN"),
+    "world": bpy.context.scene.world is not None,
+    "unpacked": [i.name for i in bpy.data.images if i.users and i.type == "IMAGE" and i.packed_file is None],
+    "libraries": len(bpy.data.libraries),
+    "drivers": sum(1 for t in bpy.data.objects if t.animation_data is not None),
+}
+open(sys.argv[2], "w").write(json.dumps(answer))
+"""
+
+
+def _mesh_hash(room: Room) -> str:
+    digest = hashlib.sha256()
+    for thing in room.objects:
+        digest.update(f"{thing.object_index} {thing.name} {thing.category}".encode())
+        digest.update(thing.mesh.vertices_m.tobytes())
+        digest.update(thing.mesh.faces.tobytes())
+    return digest.hexdigest()
+
+
+@pytest.fixture(scope="module")
+def rooms(tmp_path_factory: pytest.TempPathFactory) -> tuple[Room, Room]:
+    """The same seed in two processes and two folders."""
+    first, second = (
+        InfinigenRooms().make("bathroom", CONFIG, SEED, 0, tmp_path_factory.mktemp(name)) for name in ("a", "bb")
+    )
+    return first, second
+
+
+@pytest.fixture(scope="module")
+def blend(rooms: tuple[Room, Room], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What the first room's .blend holds."""
+    answer = tmp_path_factory.mktemp("inspection") / "answer.json"
+    subprocess.run([sys.executable, "-c", INSPECT, str(rooms[0].blend_path), str(answer)], check=True)
+    content: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
+    return content
+
+
+def test_one_seed_gives_the_same_room_in_two_processes(rooms: tuple[Room, Room]) -> None:
+    assert _mesh_hash(rooms[0]) == _mesh_hash(rooms[1])
+
+
+def test_the_room_is_acceptable_and_origin_is_on_its_floor(rooms: tuple[Room, Room]) -> None:
+    room = rooms[0]
+    check_room(room, CONFIG, NavigationConfig())
+    assert build_nav_grid(room, NavigationConfig()).free_floor_m2 >= CONFIG.min_free_floor_m2
+    floor = next(thing for thing in room.objects if thing.category == "floor")
+    np.testing.assert_allclose(floor.mesh.vertices_m[:, 2], 0.0, atol=1e-6)
+    low, high = floor.mesh.vertices_m.min(0), floor.mesh.vertices_m.max(0)
+    np.testing.assert_allclose(low[:2], -high[:2], atol=1e-4)
+    np.testing.assert_allclose(high[:2], room.floor_polygon_m.max(0), atol=1e-3)
+    # Shafts of skylights rise above the ceiling.
+    ceiling_m = min(thing.mesh.vertices_m[:, 2].min() for thing in room.objects if thing.category == "ceiling")
+    assert abs(ceiling_m - room.height_m) < 0.05
+
+
+def test_triangles_are_those_that_the_blend_renders(rooms: tuple[Room, Room], blend: dict[str, Any]) -> None:
+    things = blend["things"]
+    assert sorted(int(index) for index in things) == [thing.object_index for thing in rooms[0].objects]
+    for thing in rooms[0].objects:
+        rendered = things[str(thing.object_index)]
+        assert rendered["name"] == thing.name
+        assert rendered["triangles"] == len(thing.mesh.faces), thing.name
+        corners_m = thing.mesh.vertices_m[thing.mesh.faces].reshape(-1, 3)
+        np.testing.assert_allclose(rendered["centre"], corners_m.mean(0), atol=1e-5, err_msg=thing.name)
+        np.testing.assert_allclose(rendered["low"], corners_m.min(0), atol=1e-5, err_msg=thing.name)
+        np.testing.assert_allclose(rendered["high"], corners_m.max(0), atol=1e-5, err_msg=thing.name)
+
+
+def test_the_blend_is_plain_and_complete(blend: dict[str, Any]) -> None:
+    for thing in blend["things"].values():
+        assert (thing["modifiers"], thing["particles"], thing["hidden"], thing["parent"]) == (0, 0, False, False)
+    assert blend["other"] == []
+    assert blend["displacement"] == ["BUMP"]
+    assert (blend["unpacked"], blend["libraries"], blend["drivers"]) == ([], 0, 0)
+    assert blend["world"]
+
+
+def test_no_surface_lets_a_camera_ray_through(blend: dict[str, Any]) -> None:
+    see_through = {"SEE_THROUGH", "BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION", "VOLUME_ABSORPTION"}
+    assert see_through.isdisjoint(blend["shaders"])
+
+
+def test_lamps_are_on(rooms: tuple[Room, Room], blend: dict[str, Any]) -> None:
+    side_m = np.ptp(rooms[0].floor_polygon_m, axis=0)
+    assert blend["lamp_w"] >= 1.0 * side_m[0] * side_m[1]
