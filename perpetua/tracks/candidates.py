@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Float64, Int64
 
 from perpetua.actors.types import ActorMesh
 from perpetua.cameras.types import CameraPath
@@ -17,7 +17,6 @@ from perpetua.tracks.surface import SceneMeshes, SurfacePoints, join_points, pla
 SAMPLED_IMAGES = 64
 COVER_M = 0.04
 COVER_GAP_M = 1e-4
-COVER_TIMES = 3
 
 
 @dataclass(frozen=True)
@@ -102,38 +101,44 @@ def _plane_point(
         return np.asarray(origin_m + along[:, None] * direction)
 
 
-def draw_on_actors(actors: tuple[ActorMesh, ...], count: int, rng: np.random.Generator) -> SurfacePoints:
-    """About ``count`` points, as many on each actor, area-weighted at a middle frame, none under a garment."""
-    share = -(-count // len(actors))
-    groups = []
-    for actor in actors:
-        middle_m = actor.vertices_m[len(actor.vertices_m) // 2]
-        edge = np.cumsum(face_areas_m2(middle_m, actor.faces))
-        face = np.minimum(np.searchsorted(edge, rng.random(share) * edge[-1]), len(edge) - 1)
-        points = SurfacePoints(np.full(share, actor.object_index, np.int32), face.astype(np.int32), _inside(share, rng))
-        groups.append(points.take(~_covered(actor, points)))
-    return join_points(groups)
+class ActorSurfaces:
+    """Draws points on actors, as many on each, area-weighted at a middle frame, none under a garment."""
+
+    def __init__(self, actors: tuple[ActorMesh, ...]) -> None:
+        self.actors = actors
+        self.weight = [np.cumsum(_seen_areas_m2(actor)) for actor in actors]
+
+    def draw(self, count: int, rng: np.random.Generator) -> SurfacePoints:
+        """About ``count`` points."""
+        share = -(-count // len(self.actors))
+        groups = []
+        for actor, weight in zip(self.actors, self.weight, strict=True):
+            face = np.searchsorted(weight, rng.random(share) * weight[-1], side="right")
+            face = np.minimum(face, len(weight) - 1).astype(np.int32)
+            groups.append(SurfacePoints(np.full(share, actor.object_index, np.int32), face, _inside(share, rng)))
+        return join_points(groups)
+
+
+def _seen_areas_m2(actor: ActorMesh) -> Float64[np.ndarray, " F"]:
+    """Area of each face, 0 where another part covers it.
+
+    A face is covered when another part lies close over its middle at each of a few times, as a shirt lies over skin.
+    Rendered depth alone cannot tell skin from cloth a few millimetres above it.
+    """
+    part = np.repeat(np.arange(len(actor.parts)), [len(part.faces) for part in actor.parts])
+    frames = len(actor.vertices_m)
+    covered = np.ones(len(part), bool)
+    for frame in sorted({frames // 2, frames - 1}):
+        mesh = TriMesh(actor.vertices_m[frame].astype(np.float64), actor.faces)
+        corner_m = mesh.vertices_m[mesh.faces]
+        normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        hits = Caster(mesh).first_hit(corner_m.mean(axis=1) + COVER_GAP_M * normal, normal)
+        covered &= (hits.distance_m < COVER_M) & (part[hits.face] != part)
+    return np.where(covered, 0.0, face_areas_m2(actor.vertices_m[frames // 2], actor.faces))
 
 
 def _inside(count: int, rng: np.random.Generator) -> Float64[np.ndarray, "N 3"]:
     """Uniform in a triangle (Osada et al. 2002, Shape Distributions)."""
     root, other = np.sqrt(rng.random(count)), rng.random(count)
     return np.stack([1.0 - root, root * (1.0 - other), root * other], axis=1)
-
-
-def _covered(actor: ActorMesh, points: SurfacePoints) -> Bool[np.ndarray, " N"]:
-    """Whether another part lies close over a point at all of a few times, as a shirt lies over skin.
-
-    Rendered depth alone cannot tell skin from cloth a few millimetres above it.
-    """
-    part = np.repeat(np.arange(len(actor.parts)), [len(part.faces) for part in actor.parts])
-    covered = np.ones(len(points), bool)
-    for frame in np.unique(np.linspace(0, len(actor.vertices_m) - 1, COVER_TIMES).round().astype(int)).tolist():
-        mesh = TriMesh(actor.vertices_m[frame].astype(np.float64), actor.faces)
-        corner_m = mesh.vertices_m[mesh.faces[points.face]]
-        normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-        point_m = np.einsum("nk,nkc->nc", points.barycentric, corner_m)
-        hits = Caster(mesh).first_hit(point_m + COVER_GAP_M * normal, normal)
-        covered &= (hits.distance_m < COVER_M) & (part[hits.face] != part[points.face])
-    return covered

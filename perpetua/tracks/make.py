@@ -11,7 +11,7 @@ from perpetua.errors import TrackError
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
-from perpetua.tracks.candidates import StaticSurfaces, draw_on_actors
+from perpetua.tracks.candidates import ActorSurfaces, StaticSurfaces
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.motion import MOVING_M, travel_m
 from perpetua.tracks.queries import draw_queries, project_tracks
@@ -55,7 +55,7 @@ def make_tracks(
     moving = round(config.dynamic_share * config.count) if actors else 0
     surfaces = StaticSurfaces(meshes, cameras, views)
     still = collector.collect("static", config.count - moving, False, surfaces.draw)
-    dynamic = collector.collect("dynamic", moving, True, lambda count, rng: draw_on_actors(actors, count, rng))
+    dynamic = collector.collect("dynamic", moving, True, ActorSurfaces(actors).draw)
     points = join_points([still, dynamic])
     points = points.take(seed.stream("order").permutation(len(points)))
     bound = bind(meshes, points)

@@ -57,8 +57,7 @@ def closed_sides(vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray
     ``OPEN_EDGE_SHARE`` of its edges lack a partner of the opposite direction, and faces outwards when its signed
     volume is positive.
     """
-    _, vertex = np.unique(vertices_m, axis=0, return_inverse=True)
-    corner = vertex.reshape(-1)[faces]
+    corner = _vertex_at_one_position(vertices_m)[faces]
     surface = _surface_of_faces(corner)
     count = int(surface.max(initial=-1)) + 1
     open_edges = np.bincount(surface, weights=_unpaired_edges(corner), minlength=count)
@@ -71,6 +70,22 @@ def closed_sides(vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray
     np.maximum.at(high_m, surface, triangle_m.max(axis=1))
     closed = outward & (open_edges <= OPEN_EDGE_SHARE * edges)
     return ClosedSides(closed[surface], np.stack([low_m, high_m], axis=1)[surface])
+
+
+def _vertex_at_one_position(vertices_m: Float[np.ndarray, "P 3"]) -> Int64[np.ndarray, " P"]:
+    """Numbers vertices so that those at one position share a number.
+
+    Sorting one mixed word per vertex is ten times as quick as sorting rows. Two positions with one word by chance
+    (about one in 10^7 for a million vertices) would join two surfaces for the test of openness alone.
+    """
+    # Adding zero makes -0.0 and 0.0 one position.
+    words = (np.ascontiguousarray(vertices_m, np.float64) + 0.0).view(np.uint64)
+    mixed = words[:, 0].copy()
+    for axis in (1, 2):
+        mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0x9E3779B97F4A7C15) + words[:, axis]
+        mixed *= np.uint64(0xD6E8FEB86659FD93)
+    _, vertex = np.unique(mixed ^ (mixed >> np.uint64(32)), return_inverse=True)
+    return np.asarray(vertex, np.int64).reshape(-1)
 
 
 def _surface_of_faces(corner: Integer[np.ndarray, "F 3"]) -> Int64[np.ndarray, " F"]:

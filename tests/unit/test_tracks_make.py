@@ -9,7 +9,7 @@ from synthetic_scene import make_scene
 from synthetic_sequence import make_scene_tracks
 
 from perpetua.errors import TrackError
-from perpetua.tracks.candidates import draw_on_actors
+from perpetua.tracks.candidates import ActorSurfaces
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.motion import travel_m
 from perpetua.tracks.queries import draw_queries
@@ -110,7 +110,7 @@ def test_without_actors_every_track_is_static() -> None:
 
 def test_skin_under_a_shirt_is_never_drawn() -> None:
     actor = make_scene().actors[0]
-    points = draw_on_actors((actor,), 2000, np.random.default_rng(3))
+    points = ActorSurfaces((actor,)).draw(2000, np.random.default_rng(3))
     body_faces = len(actor.parts[0].faces)
     centre = actor.vertices_m[0][actor.faces[points.face]].mean(axis=1)
     height_m = centre[:, 2]
