@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float32, Float64, Int32
 from perpetua.actors.bodies.hair import make_hair, scalp_field_m
 from perpetua.actors.bodies.makehuman import Traits, base_mesh, shape
 from perpetua.actors.bodies.people import Person, draw_person
-from perpetua.actors.bodies.rig import BoundRig, base_weights, bind, joint_index, skin
+from perpetua.actors.bodies.rig import BoundRig, base_weights, bind, joint_index, relaxed_hands, skin
 from perpetua.actors.bodies.skin import eye_uv, paint_eye, paint_skin, texel_places_m
 from perpetua.actors.bodies.source import BODY_MODELS, Body
 from perpetua.actors.clothing.outfit import Dressed, dress
@@ -49,7 +49,7 @@ class AnnyModel:
     def draw(self, actor: int, config: ActorsConfig, seed: StageSeed) -> Body:
         """The body of one actor of a room."""
         person = draw_person(actor, config, seed)
-        wearer = Wearer(_shaped(person), person.traits.female)
+        wearer = Wearer(relaxed_hands(_shaped(person)))
         rng = seed.stream("looks", actor)
         dressed = dress(wearer, person.outfit, seed)
         hair = make_hair(wearer, person.hair, person.complexion.hair, rng)
@@ -81,7 +81,7 @@ def _flesh(wearer: Wearer, person: Person, dressed: Dressed, rng: np.random.Gene
     shown = ~np.all(dressed.hidden[body.faces], axis=1) & ~mouth
     uv = np.concatenate([corners[shown][:, [0, 1, 2]], corners[shown][:, [0, 2, 3]]]).astype(np.float32)
     places, _ = texel_places_m()
-    scalp = np.clip(scalp_field_m(places.astype(np.float64), person.hair.line_shift_m) / 0.008, 0.0, 1.0)
+    scalp = np.clip(scalp_field_m(places.astype(np.float64), person.hair.line_shift_m) / 0.012, 0.0, 1.0)
     image = paint_skin(person.complexion, scalp, rng)
     skin_material = Material("skin", person.complexion.skin, roughness=0.55, image=image)
     eye_material = Material("eyes", (0.7, 0.7, 0.7), roughness=0.15, image=paint_eye(person.complexion, rng))

@@ -19,6 +19,7 @@ from perpetua.rooms.types import Material
 
 _BODY_VERTICES = 13380
 _ROWS = 6
+_LONG_M = 0.12
 _CROWN_M = np.array([0.035, 0.0, 0.848])
 # Height of the hairline on the base mesh, from the nape forward: over the ear, down the temple, across the forehead.
 _LINE_X_M = (-0.02, 0.005, 0.022, 0.036, 0.058, 0.070, 0.082, 0.100, 0.125, 0.150)
@@ -47,15 +48,15 @@ class HairStyle:
 
 
 STYLES = {
-    "cropped": HairStyle("cropped", 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.006, 0.0015, 0.0, 0.0),
-    "short": HairStyle("short", 260, 0.045, 0.055, 0.015, 0.35, 0.5, 0.0, 0.010, 0.002, 0.002, 0.0),
-    "side part": HairStyle("side part", 260, 0.060, 0.085, 0.016, 0.25, 0.2, 1.0, 0.012, 0.002, 0.002, 0.0),
-    "swept back": HairStyle("swept back", 260, 0.070, 0.090, 0.015, 0.30, -1.2, 0.0, 0.012, 0.002, 0.003, 0.004),
-    "bob": HairStyle("bob", 300, 0.190, 0.180, 0.019, 0.15, 0.0, 0.6, 0.013, 0.002, 0.003, 0.0),
-    "long": HairStyle("long", 300, 0.360, 0.340, 0.020, 0.10, -0.2, 0.3, 0.012, 0.002, 0.008, 0.0),
-    "curly": HairStyle("curly", 320, 0.085, 0.080, 0.018, 0.75, 0.0, 0.0, 0.022, 0.006, 0.012, 0.0),
-    "afro": HairStyle("afro", 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.048, 0.007, 0.0, 0.002),
-    "bun": HairStyle("bun", 0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.012, 0.001, 0.0, 0.0),
+    "cropped": HairStyle("cropped", 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    "short": HairStyle("short", 230, 0.040, 0.045, 0.019, 0.10, 0.5, 0.0, 0.010, 0.002, 0.002, 0.0),
+    "side-parted": HairStyle("side-parted", 230, 0.050, 0.080, 0.020, 0.08, 0.0, 0.9, 0.012, 0.002, 0.002, 0.0),
+    "swept-back": HairStyle("swept-back", 230, 0.055, 0.085, 0.019, 0.10, -1.4, 0.0, 0.014, 0.002, 0.003, 0.003),
+    "chin-length": HairStyle("chin-length", 260, 0.200, 0.215, 0.024, 0.0, 0.0, 1.0, 0.014, 0.002, 0.002, 0.0),
+    "long": HairStyle("long", 250, 0.330, 0.345, 0.026, 0.0, -0.3, 1.0, 0.013, 0.002, 0.006, 0.0),
+    "curly": HairStyle("curly", 300, 0.055, 0.055, 0.022, 0.30, 0.2, 0.0, 0.020, 0.006, 0.010, 0.0),
+    "afro": HairStyle("afro", 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.045, 0.005, 0.0, 0.002),
+    "tied-up": HairStyle("tied-up", 0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.012, 0.001, 0.0, 0.0),
 }
 
 
@@ -110,49 +111,89 @@ def _roots(cap: Surface, count: int, rng: np.random.Generator) -> Int32[np.ndarr
     return np.array(chosen, dtype=np.int32)
 
 
+@dataclass(frozen=True)
+class _Skull:
+    """The skin that locks lie on: its points, normals and places on the base mesh, with a search tree."""
+
+    places_m: Float64[np.ndarray, "P 3"]
+    normals: Float64[np.ndarray, "P 3"]
+    template_m: Float64[np.ndarray, "P 3"]
+    tree: cKDTree
+
+
+def _skull(wearer: Wearer) -> _Skull:
+    template_m = base_mesh().vertices_m[:_BODY_VERTICES]
+    faces = triangles(base_mesh().groups["body"].faces)
+    normals = vertex_normals(wearer.vertices_m, faces)[:_BODY_VERTICES]
+    upper = template_m[:, 2] > 0.35
+    places_m = wearer.vertices_m[:_BODY_VERTICES][upper]
+    return _Skull(places_m, normals[upper], template_m[upper], cKDTree(places_m))
+
+
+def _combed(
+    template_m: Float64[np.ndarray, "L 3"],
+    normal: Float64[np.ndarray, "L 3"],
+    style: HairStyle,
+    rng: np.random.Generator,
+) -> Float64[np.ndarray, "L 3"]:
+    """Directions in which locks leave their roots: away from the crown, swept and parted as the style has it."""
+    front = np.clip((template_m[:, 0] - 0.05) / 0.06, 0.0, 1.0)[:, None]
+    away = template_m - _CROWN_M
+    away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
+    away[:, 0] += 0.6 * style.sweep
+    parted = np.sign(template_m[:, 1] - 0.025)[:, None]
+    sideways = np.concatenate([np.full_like(parted, -0.45), 1.2 * parted, np.full_like(parted, -0.3)], axis=1)
+    aside = style.part * front
+    direction = (1.0 - aside) * away + aside * sideways
+    direction -= np.sum(direction * normal, axis=1, keepdims=True) * normal
+    direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-6)
+    return np.asarray(direction + 0.18 * rng.standard_normal(direction.shape))
+
+
+def _settle(
+    place: Float64[np.ndarray, "L 3"], skull: _Skull, clearance_m: Float64[np.ndarray, " L"], style: HairStyle
+) -> tuple[Float64[np.ndarray, "L 3"], Float64[np.ndarray, "L 3"]]:
+    """Lays points on the skull at their clearance, keeps them off the face, and lets them hang clear elsewhere."""
+    _, near = skull.tree.query(place)
+    template_m = skull.template_m[near]
+    face = (template_m[:, 0] > 0.07) & (template_m[:, 2] < 0.775) & (template_m[:, 2] > 0.58)
+    aside = np.where(face, np.maximum(0.080 - np.abs(template_m[:, 1]), 0.0), 0.0)
+    place = place + (np.sign(place[:, 1]) * aside)[:, None] * np.array([0.0, 1.0, 0.0])
+    _, near = skull.tree.query(place)
+    gap = np.sum((place - skull.places_m[near]) * skull.normals[near], axis=1)
+    on_scalp = scalp_field_m(skull.template_m[near], style.line_shift_m) > -0.012
+    lift = np.where(on_scalp, clearance_m - gap, np.maximum(clearance_m - gap, 0.0))
+    return place + lift[:, None] * skull.normals[near], skull.normals[near]
+
+
 def _grow(
     cap: Surface, cap_normal: np.ndarray, wearer: Wearer, style: HairStyle, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Spines of the locks, their surface normals, and each one's share of full length at its rows."""
+) -> tuple[Float64[np.ndarray, "L R 3"], Float64[np.ndarray, "L R 3"]]:
+    """Spines of the locks and the directions of the skin under them."""
     faces = cap.faces[_roots(cap, style.locks, rng)]
     root_m, normal = cap.vertices_m[faces].mean(axis=1), cap_normal[faces].mean(axis=1)
     template_m = cap.template_m[faces].mean(axis=1)
-    crown_m = cap.vertices_m[np.argmin(np.linalg.norm(cap.template_m - _CROWN_M, axis=1))]
-    outward = root_m - crown_m
-    outward[:, 0] += style.sweep * 0.06
-    parted = np.sign(template_m[:, 1] - 0.028 * style.part)
+    heading = _combed(template_m, normal, style, rng)
     front = np.clip((template_m[:, 0] - 0.06) / 0.06, 0.0, 1.0)
-    outward[:, 1] += style.part * parted * 0.06 * (0.3 + front)
-    direction = outward - np.sum(outward * normal, axis=1, keepdims=True) * normal
-    direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-6)
-    direction += 0.25 * rng.standard_normal(direction.shape)
     length = style.length_m + (style.front_length_m - style.length_m) * front
     length = length * rng.uniform(0.8, 1.1, len(length))
-    skin_m = wearer.vertices_m[:_BODY_VERTICES]
-    head = base_mesh().vertices_m[:_BODY_VERTICES, 2] > 0.35
-    skin_faces = base_mesh().groups["body"].faces
-    skin_normal = vertex_normals(wearer.vertices_m, triangles(skin_faces))[:_BODY_VERTICES][head]
-    skin_m = skin_m[head]
-    tree = cKDTree(skin_m)
-    clearance = rng.uniform(0.35, 1.0, len(length)) * (style.cap_m + 0.006) + 0.004
-    spine = [root_m]
-    normals = [normal]
-    heading = direction + style.lift * normal
+    skull = _skull(wearer)
+    clearance_m = style.cap_m * rng.uniform(0.6, 1.15, len(length)) + 0.003
     wave = rng.uniform(0.0, 2.0 * np.pi, len(length))
+    spine, normals = [root_m - 0.004 * normal], [normal]
     for row in range(1, _ROWS):
-        heading = heading + np.array([0.0, 0.0, -0.55 if style.length_m > 0.1 else -0.15])
+        heading = heading + np.array([0.0, 0.0, -0.8 if style.length_m > _LONG_M else -0.1])
+        heading -= 0.9 * np.minimum(np.sum(heading * normals[-1], axis=1, keepdims=True), 0.0) * normals[-1]
         heading /= np.linalg.norm(heading, axis=1, keepdims=True)
         place = spine[-1] + heading * (length / (_ROWS - 1))[:, None]
-        across = np.cross(heading, normals[-1])
-        place = place + style.curl_m * np.sin(1.9 * row + wave)[:, None] * across
-        _, near = tree.query(place)
-        gap = np.sum((place - skin_m[near]) * skin_normal[near], axis=1)
-        place = place + np.maximum(clearance - gap, 0.0)[:, None] * skin_normal[near]
+        place += style.curl_m * np.sin(1.9 * row + wave)[:, None] * np.cross(heading, normals[-1])
+        rise_m = clearance_m + style.lift * length * (row / (_ROWS - 1)) ** 1.5
+        place, outward = _settle(place, skull, rise_m, style)
         heading = place - spine[-1]
         heading /= np.maximum(np.linalg.norm(heading, axis=1, keepdims=True), 1e-6)
         spine.append(place)
-        normals.append(skin_normal[near])
-    return np.stack(spine, axis=1), np.stack(normals, axis=1), np.linspace(0.0, 1.0, _ROWS)
+        normals.append(outward)
+    return np.stack(spine, axis=1), np.stack(normals, axis=1)
 
 
 def _locks(
@@ -168,7 +209,7 @@ def _locks(
     across = np.cross(along, normal)
     across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-9)
     above = np.cross(across, along)
-    taper = np.interp(np.linspace(0.0, 1.0, rows), [0.0, 0.25, 0.7, 1.0], [0.75, 1.0, 0.85, 0.12])
+    taper = np.interp(np.linspace(0.0, 1.0, rows), [0.0, 0.25, 0.7, 1.0], [0.8, 1.0, 0.95, 0.30])
     half = 0.5 * style.width_m * taper[None, :, None] * rng.uniform(0.8, 1.25, locks)[:, None, None]
     middle = spine + 0.35 * half * above
     vertices = np.stack([spine - half * across, middle, spine + half * across], axis=2)
@@ -198,9 +239,16 @@ def hair_image(colour: tuple[float, float, float], rng: np.random.Generator) -> 
     size = 256
     strands = rng.normal(0.0, 1.0, size)
     broad = np.convolve(np.tile(rng.normal(0.0, 1.0, size), 3), np.ones(9) / 3.0, mode="same")[size : 2 * size]
-    drift = 0.35 * tileable_noise(rng, size, 6, 3)
-    light = np.clip(0.85 + 0.28 * strands[None, :] + 0.25 * broad[None, :] + drift, 0.25, 2.2)
+    drift = 0.12 * tileable_noise(rng, size, 6, 3)
+    light = np.clip(0.95 + 0.16 * strands[None, :] + 0.16 * broad[None, :] + drift, 0.45, 1.7)
     return to_srgb(np.array(colour) * light[..., None] + 0.004)
+
+
+def curl_image(colour: tuple[float, float, float], rng: np.random.Generator) -> np.ndarray:
+    """Tight curls: small bright rims with dark gaps."""
+    curls = np.abs(tileable_noise(rng, 256, 40, 2))
+    light = np.clip(0.35 + 0.9 * curls + 0.1 * tileable_noise(rng, 256, 6, 2), 0.2, 2.0)
+    return to_srgb(np.array(colour) * light[..., None] + 0.003)
 
 
 def _bun(cap: Surface, style: HairStyle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -222,7 +270,9 @@ def _bun(cap: Surface, style: HairStyle) -> tuple[np.ndarray, np.ndarray, np.nda
 
 
 def make_hair(wearer: Wearer, style: HairStyle, colour: tuple[float, float, float], rng: np.random.Generator) -> Piece:
-    """Hair of one style on this head."""
+    """Hair of one style on this head; cropped hair is painted on the skin alone."""
+    if style.cap_m == 0.0:
+        return Piece(np.zeros((0, 3)), np.zeros((0, BONE_COUNT)), ())
     scalp, field_m = _scalp(wearer, style)
     normal = vertex_normals(scalp.vertices_m, scalp.faces)
     rise = np.clip(field_m / max(0.9 * style.cap_m, 0.012), 0.0, 1.0)
@@ -235,12 +285,12 @@ def make_hair(wearer: Wearer, style: HairStyle, colour: tuple[float, float, floa
     )
     vertices, faces, uvs = [cap_m], [scalp.faces], [cap_uv]
     if style.locks > 0:
-        spine, normals, _ = _grow(cap, vertex_normals(cap_m, cap.faces), wearer, style, rng)
+        spine, normals = _grow(cap, vertex_normals(cap_m, cap.faces), wearer, style, rng)
         made = _locks(spine, normals, style, rng)
         vertices.append(made[0])
         faces.append(made[1] + len(cap_m))
         uvs.append(made[2])
-    if style.name == "bun":
+    if style.name == "tied-up":
         made = _bun(cap, style)
         vertices.append(made[0])
         faces.append(made[1] + len(cap_m))
@@ -249,6 +299,7 @@ def make_hair(wearer: Wearer, style: HairStyle, colour: tuple[float, float, floa
     chin_z_m = float(
         wearer.vertices_m[:_BODY_VERTICES][base_weights()[:_BODY_VERTICES, joint_index("head")] > 0.9, 2].min()
     )
-    shade = Material("hair", colour, roughness=0.5, image=hair_image(colour, rng))
+    image = curl_image(colour, rng) if style.name == "afro" else hair_image(colour, rng)
+    shade = Material("hair", colour, roughness=0.6, image=image)
     part = ActorPart("hair", np.concatenate(faces).astype(np.int32), np.concatenate(uvs).astype(np.float32), shade)
     return Piece(all_m, _hanging_weights(all_m, chin_z_m), (part,))

@@ -37,8 +37,8 @@ _IRIS = {
     "blue": (0.10, 0.22, 0.36),
     "green": (0.12, 0.19, 0.10),
 }
-_MEN_HAIR = ("short", "side part", "swept back", "cropped", "short", "curly")
-_WOMEN_HAIR = ("bob", "long", "bun", "long", "bob", "curly", "short")
+_MEN_HAIR = ("short", "side-parted", "swept-back", "cropped", "short", "curly")
+_WOMEN_HAIR = ("chin-length", "long", "tied-up", "long", "chin-length", "curly", "short")
 _STATURE_M = {False: (1.77, 0.065), True: (1.64, 0.06)}
 
 

@@ -42,6 +42,10 @@ _SIDE_BONES = {
 }
 
 
+# How far each finger's three segments bend at rest, from the knuckle outward.
+_FINGER_BEND_DEG = {2: (12.0, 22.0, 14.0), 3: (18.0, 26.0, 16.0), 4: (22.0, 28.0, 18.0), 5: (24.0, 28.0, 18.0)}
+
+
 def joint_index(name: str) -> int:
     """Column of a joint or twist bone in skinning weights."""
     return _INDEX[name]
@@ -98,6 +102,32 @@ def _frame(forward: Float64[np.ndarray, "3"], up: Float64[np.ndarray, "3"]) -> F
     y = np.cross(up, x)
     y /= np.linalg.norm(y)
     return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def relaxed_hands(vertices_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, "P 3"]:
+    """The body with its fingers bent a little, as hands that do nothing are; MakeHuman's are stretched."""
+    heads = bone_heads(vertices_m)
+    moved = vertices_m.copy()
+    for letter, sign in (("L", 1.0), ("R", -1.0)):
+        across = sign * (heads[f"finger2-1.{letter}"] - heads[f"finger5-1.{letter}"])
+        across /= np.linalg.norm(across)
+        for finger, bends in _FINGER_BEND_DEG.items():
+            turn, shift_m = np.eye(3), np.zeros(3)
+            for segment, bend in enumerate(bends, start=1):
+                bone = f"finger{finger}-{segment}.{letter}"
+                rotation = _about(across, np.radians(bend))
+                # Composed outward: the segments before have already carried this joint along.
+                shift_m = shift_m + turn @ (heads[bone] - rotation @ heads[bone])
+                turn = turn @ rotation
+                vertices, weights = bone_weights()[bone]
+                offset = vertices_m[vertices] @ turn.T + shift_m - vertices_m[vertices]
+                np.add.at(moved, vertices, weights[:, None] * offset)
+    return moved
+
+
+def _about(axis: Float64[np.ndarray, "3"], angle_rad: float) -> Float64[np.ndarray, "3 3"]:
+    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle_rad) * cross + (1.0 - np.cos(angle_rad)) * (cross @ cross))
 
 
 @dataclass(frozen=True)

@@ -100,8 +100,8 @@ def paint_skin(
     colour = colour * (1.0 - shade[..., None] * np.array([0.6, 1.0, 0.9]))
     lips = np.clip(1.6 * _blob(places, (0.155, 0.0, 0.6575), (0.03, 0.024, 0.0075)) - 0.45, 0.0, 1.0)[..., None]
     colour = colour * (1.0 - 0.8 * lips * (1.0 - np.array([0.80, 0.48, 0.50])))
-    freckles = np.clip(tileable_noise(rng, SKIN_PX, 90, 2) - 2.2, 0.0, 1.0)[..., None]
-    colour = colour * (1.0 - 0.45 * freckles)
+    freckles = np.clip(tileable_noise(rng, SKIN_PX, 90, 2) - 2.5, 0.0, 1.0)[..., None]
+    colour = colour * (1.0 - 0.35 * freckles)
     strands = 0.8 + 0.25 * tileable_noise(rng, SKIN_PX, 150, 2)
     cover = np.clip(_brows(places, look.brow_m) * strands, 0.0, 0.95)
     cover = np.maximum(cover, np.clip(look.beard * _beard(places) * strands, 0.0, 0.9))

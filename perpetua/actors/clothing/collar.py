@@ -18,7 +18,7 @@ _ROWS_M = {
 _UP = np.array([0.25, 0.0, 0.97])
 
 
-def _neck_loop(outside: Surface, field_m: Float64[np.ndarray, " P"]) -> Int32[np.ndarray, " L"]:
+def _neck_loop(outside: Surface) -> Int32[np.ndarray, " L"]:
     """The vertices of the neckline in order, starting at the front."""
     edges = border_edges(outside.faces)
     middle = outside.template_m[edges].mean(axis=1)
@@ -31,19 +31,18 @@ def _neck_loop(outside: Surface, field_m: Float64[np.ndarray, " P"]) -> Int32[np
     return np.array(loop, dtype=np.int32)
 
 
-def collar(top: Piece, outside: Surface, field_m: Float64[np.ndarray, " P"], kind: str, fabric: Fabric) -> Piece:
+def collar(top: Piece, outside: Surface, kind: str, fabric: Fabric) -> Piece:
     """The top with a collar sewn to its neckline ("none" leaves it as it is).
 
     Args:
         top: the finished top; its first vertices are those of ``outside``.
         outside: the top's outer side, from which the neckline is found.
-        field_m: metres inside the cut lines.
         kind: "none", "band", "polo" or "shirt".
         fabric: the top's fabric.
     """
     if kind == "none":
         return top
-    loop = _neck_loop(outside, field_m)
+    loop = _neck_loop(outside)
     ring_m = outside.vertices_m[loop]
     normal = vertex_normals(outside.vertices_m, outside.faces)[loop]
     outward = normal - (normal @ _UP)[:, None] * _UP

@@ -13,11 +13,11 @@ _NORMAL_PASSES = 12
 
 @dataclass(frozen=True)
 class Drape:
-    """``gap_m`` is the least distance from the body, ``hold`` how strongly cloth keeps the ease it was cut with."""
+    """Per vertex, ``gap_m`` is the least distance from the body, ``hold`` how strongly cloth keeps its ease."""
 
-    gap_m: float
+    gap_m: Float64[np.ndarray, " P"]
     passes: int
-    hold: float
+    hold: Float64[np.ndarray, " P"]
 
 
 def smooth_normals(surface: Surface) -> Float64[np.ndarray, "P 3"]:
@@ -39,8 +39,9 @@ def draped(surface: Surface, ease_m: Float64[np.ndarray, " P"], how: Drape) -> F
     normal = smooth_normals(surface)
     wanted = surface.vertices_m + ease_m[:, None] * normal
     cloth = wanted.copy()
+    hold = how.hold[:, None]
     for _ in range(how.passes):
-        cloth = np.asarray((1.0 - how.hold) * (0.4 * cloth + 0.6 * (mean @ cloth)) + how.hold * wanted)
+        cloth = np.asarray((1.0 - hold) * (0.4 * cloth + 0.6 * (mean @ cloth)) + hold * wanted)
         gap = np.einsum("pa,pa->p", cloth - surface.vertices_m, normal)
         cloth += np.maximum(how.gap_m - gap, 0.0)[:, None] * normal
     return cloth
@@ -60,29 +61,27 @@ def wrinkles(
     return total / 5.0
 
 
-def hemmed(
-    surface: Surface, field_m: Float64[np.ndarray, " P"], width_m: float, thickness_m: float
-) -> tuple[Surface, Float64[np.ndarray, " P"], int]:
-    """The cloth with its cut edges turned in: a strip of inner side ``width_m`` wide along the zero line of the field.
+def hemmed(surface: Surface, field_m: Float64[np.ndarray, " P"], width_m: float, thickness_m: float) -> Surface:
+    """The cloth with its cut edges turned in, by a strip of inner side ``width_m`` wide.
 
-    Returns:
-        The surface, the field on its vertices, and how many of its faces (the first ones) are the outer side.
+    Args:
+        surface: the cloth's outer side.
+        field_m: metres from the cut edges, exactly 0 on them and nowhere else.
+        width_m: width of the strip.
+        thickness_m: distance between the two sides.
     """
-    strip, strip_field = positive(surface, width_m - field_m)
-    normal = vertex_normals(strip.vertices_m, strip.faces)
-    inner_m = strip.vertices_m - thickness_m * normal
+    strip, strip_field_m = positive(surface, width_m - field_m)
+    inner_m = strip.vertices_m - thickness_m * vertex_normals(strip.vertices_m, strip.faces)
     offset = len(surface.vertices_m)
     outer_edges = _edges_on_line(surface.faces, field_m)
-    inner_edges = _edges_on_line(strip.faces, width_m - strip_field)
+    inner_edges = _edges_on_line(strip.faces, width_m - strip_field_m)
     bridge = _bridge(surface, outer_edges, strip, inner_edges, offset)
-    faces = np.concatenate([surface.faces, strip.faces[:, ::-1] + offset, bridge]).astype(np.int32)
-    joined = Surface(
+    return Surface(
         np.concatenate([surface.template_m, strip.template_m]),
         np.concatenate([surface.vertices_m, inner_m]),
         np.concatenate([surface.weights, strip.weights]),
-        faces,
+        np.concatenate([surface.faces, strip.faces[:, ::-1] + offset, bridge]).astype(np.int32),
     )
-    return joined, np.concatenate([field_m, width_m - strip_field]), len(surface.faces)
 
 
 def _edges_on_line(faces: Int32[np.ndarray, "F 3"], field_m: Float64[np.ndarray, " P"]) -> Int32[np.ndarray, "E 2"]:

@@ -8,17 +8,18 @@ from jaxtyping import Bool
 from perpetua.actors.bodies.makehuman import base_mesh
 from perpetua.actors.bodies.rig import base_weights
 from perpetua.actors.clothing.fabrics import weave
-from perpetua.actors.clothing.piece import Piece
-from perpetua.actors.clothing.shoes import Footing, ShoePattern, make_shoes, shoe_field_m
-from perpetua.actors.clothing.tailor import (
+from perpetua.actors.clothing.patterns import (
+    SkirtPattern,
     TopPattern,
     TrouserPattern,
     covered_by,
-    sew_top,
-    sew_trousers,
+    skirt_field_m,
     top_field_m,
     trouser_field_m,
 )
+from perpetua.actors.clothing.piece import Piece
+from perpetua.actors.clothing.shoes import Footing, ShoePattern, make_shoes, shoe_field_m
+from perpetua.actors.clothing.tailor import sew_skirt, sew_top, sew_trousers
 from perpetua.actors.clothing.wearer import Wearer
 from perpetua.seeding import StageSeed
 
@@ -63,18 +64,22 @@ _TOP_FABRICS: dict[str, tuple[str, ...]] = {
     "jumper": ("knit",),
     "long-sleeved top": ("stripes", "heather", "print"),
 }
-_TROUSERS: dict[str, TrouserPattern] = {
-    "jeans": TrouserPattern(0.125, -0.752, 0.008, 0.015, 0.003),
-    "slim trousers": TrouserPattern(0.130, -0.735, 0.007, 0.011, 0.003),
-    "loose trousers": TrouserPattern(0.130, -0.755, 0.011, 0.026, 0.003),
-    "shorts": TrouserPattern(0.125, -0.340, 0.011, 0.028, 0.003),
+_BOTTOMS: dict[str, TrouserPattern | SkirtPattern] = {
+    "jeans": TrouserPattern(0.125, 0.800, 0.008, 0.015, 0.003),
+    "slim trousers": TrouserPattern(0.130, 0.785, 0.007, 0.011, 0.003),
+    "loose trousers": TrouserPattern(0.130, 0.800, 0.011, 0.026, 0.003),
+    "shorts": TrouserPattern(0.125, 0.375, 0.011, 0.026, 0.003),
+    "skirt": SkirtPattern(0.140, -0.380, 0.004, 0.003),
 }
-_TROUSER_FABRICS = {
+_BOTTOM_FABRICS: dict[str, tuple[str, ...]] = {
     "jeans": ("denim",),
     "slim trousers": ("plain",),
     "loose trousers": ("plain", "heather"),
     "shorts": ("plain", "denim"),
+    "skirt": ("plain", "checks", "denim", "print"),
 }
+_MEN_WEAR = ("jeans", "slim trousers", "jeans", "loose trousers", "shorts", "loose trousers")
+_WOMEN_WEAR = ("jeans", "slim trousers", "skirt", "jeans", "loose trousers", "skirt", "shorts")
 _SHOES = ("trainers", "runners", "leather shoes")
 
 
@@ -93,8 +98,8 @@ class Outfit:
 
     top: TopPattern
     top_cloth: Cloth
-    trousers: TrouserPattern
-    trouser_cloth: Cloth
+    bottom: TrouserPattern | SkirtPattern
+    bottom_cloth: Cloth
     shoes: ShoePattern
     words: str
     actor: int
@@ -130,14 +135,14 @@ def draw_outfit(actor: int, female: bool, seed: StageSeed) -> Outfit:
     dye = _TOP_DYES[int(room.permutation(len(_TOP_DYES))[actor % len(_TOP_DYES)])]
     other = _pick(tuple(name for name in _TOP_DYES if name != dye), rng)
     top_cloth = Cloth(_pick(_TOP_FABRICS[top], rng), dye, other)
-    kinds = ("jeans", "slim trousers", "jeans", "loose trousers", "shorts")
-    legs = _pick(kinds, rng)
-    leg_cloth = Cloth(_pick(_TROUSER_FABRICS[legs], rng), "navy" if legs == "jeans" else _pick(_LEG_DYES, rng), "white")
+    legs = _pick(_WOMEN_WEAR if female else _MEN_WEAR, rng)
+    leg_cloth = Cloth(_pick(_BOTTOM_FABRICS[legs], rng), "navy" if legs == "jeans" else _pick(_LEG_DYES, rng), "white")
     shoes = _pick(_SHOES, rng)
-    words = f"a {dye} {top_cloth.fabric} {top}, {leg_cloth.base} {legs} and {shoes}"
+    below = f"a {leg_cloth.base} skirt" if legs == "skirt" else f"{leg_cloth.base} {legs}"
+    words = f"a {dye} {top_cloth.fabric} {top}, {below} and {shoes}"
     words = words.replace("knit jumper", "knitted jumper").replace("print ", "printed ").replace("stripes ", "striped ")
     words = words.replace("checks ", "checked ").replace("dots ", "dotted ")
-    return Outfit(_TOPS[top], top_cloth, _TROUSERS[legs], leg_cloth, _draw_shoes(shoes, rng), words, actor)
+    return Outfit(_TOPS[top], top_cloth, _BOTTOMS[legs], leg_cloth, _draw_shoes(shoes, rng), words, actor)
 
 
 def dress(wearer: Wearer, outfit: Outfit, seed: StageSeed) -> Dressed:
@@ -145,13 +150,17 @@ def dress(wearer: Wearer, outfit: Outfit, seed: StageSeed) -> Dressed:
     rng = seed.stream("sewing", outfit.actor)
     cloths = [
         weave(cloth.fabric, DYES[cloth.base], DYES[cloth.other], rng)
-        for cloth in (outfit.top_cloth, outfit.trouser_cloth)
+        for cloth in (outfit.top_cloth, outfit.bottom_cloth)
     ]
     template_m, weights = base_mesh().vertices_m, base_weights()
     shoes, footing = make_shoes(wearer, outfit.shoes, rng)
     top = sew_top(wearer, outfit.top, cloths[0], rng)
-    trousers = sew_trousers(wearer, outfit.trousers, cloths[1], rng)
     hidden = covered_by(top_field_m(outfit.top, template_m, weights))
-    hidden |= covered_by(trouser_field_m(outfit.trousers, template_m, weights))
+    if isinstance(outfit.bottom, SkirtPattern):
+        bottom = sew_skirt(wearer, outfit.bottom, outfit.top, cloths[1], rng)
+        hidden |= covered_by(skirt_field_m(outfit.bottom, template_m, weights))
+    else:
+        bottom = sew_trousers(wearer, outfit.bottom, outfit.top, cloths[1], rng)
+        hidden |= covered_by(trouser_field_m(outfit.bottom, template_m, weights))
     hidden |= shoe_field_m(outfit.shoes, template_m) > 0.02
-    return Dressed((top, trousers, shoes), hidden, footing)
+    return Dressed((top, bottom, shoes), hidden, footing)

@@ -116,8 +116,8 @@ def _upper(last: _Last, pattern: ShoePattern) -> tuple[np.ndarray, np.ndarray, n
     """Vertices, faces and UVs of the upper: one arch from side to side at each section."""
     outline = _outline(last, pattern)
     share = (last.along_m - last.along_m[0]) / (last.along_m[-1] - last.along_m[0])
-    toe_box = np.interp(share, [0.0, 0.75, 0.9, 1.0], [1.0, 1.0, 0.92, 0.55])
-    heel_box = np.interp(share, [0.0, 0.06, 0.14], [0.80, 0.96, 1.0])
+    toe_box = np.interp(share, [0.0, 0.75, 0.9, 1.0], [1.0, 1.0, 0.90, 0.45])
+    heel_box = np.interp(share, [0.0, 0.06, 0.14], [0.90, 0.98, 1.0])
     top = np.maximum(last.top_m, 0.040) * toe_box * heel_box
     angle = np.linspace(0.0, np.pi, _ARCH)
     squareness = 2.0 / np.interp(share, [0.0, 0.3, 1.0], [3.0, 2.6, 2.2])
@@ -128,7 +128,10 @@ def _upper(last: _Last, pattern: ShoePattern) -> tuple[np.ndarray, np.ndarray, n
     up = high * top[:, None] - 0.004
     along = np.repeat(last.along_m, _ARCH)
     vertices = _place(last, along, across.ravel(), up.ravel())
-    faces = _grid_faces(_SECTIONS, _ARCH)
+    # The loft's two ends are closed by fans.
+    fan = np.stack([np.zeros(_ARCH - 2, int), np.arange(1, _ARCH - 1), np.arange(2, _ARCH)], axis=1)
+    front = fan + (_SECTIONS - 1) * _ARCH
+    faces = np.concatenate([_grid_faces(_SECTIONS, _ARCH), fan[:, ::-1], front]).astype(np.int32)
     flat = np.stack([np.repeat(share, _ARCH), np.tile(angle / np.pi, _SECTIONS)], axis=1)
     return vertices, faces, flat[faces].astype(np.float32)
 

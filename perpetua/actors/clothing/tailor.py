@@ -1,101 +1,39 @@
-"""Tops and trousers, cut from the base mesh's tights along lines drawn on the unshaped body.
+"""Tops, trousers and skirts, cut from the base mesh's tights and skirt and laid on a body."""
 
-All lengths of a pattern are those of the base mesh (1.67 m tall); they follow each body's shape.
-"""
-
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32
+from jaxtyping import Float64
 
 from perpetua.actors.bodies.rig import joint_index
 from perpetua.actors.clothing.collar import collar
 from perpetua.actors.clothing.drape import Drape, draped, hemmed, smooth_normals, wrinkles
 from perpetua.actors.clothing.fabrics import Fabric
+from perpetua.actors.clothing.patterns import (
+    SkirtPattern,
+    TopPattern,
+    TrouserPattern,
+    skirt_field_m,
+    top_field_m,
+    trouser_field_m,
+)
 from perpetua.actors.clothing.piece import Piece, Surface
-from perpetua.actors.clothing.surface import averaging, positive, split
-from perpetua.actors.clothing.unwrap import around
-from perpetua.actors.clothing.wearer import Wearer, along_arm_m, arm_share, refined_group, template_joints
+from perpetua.actors.clothing.surface import averaging, border_edges, positive, split
+from perpetua.actors.clothing.unwrap import around, front_m, limbs, trunk
+from perpetua.actors.clothing.wearer import Wearer, along_arm_m, along_leg_m, arm_share, refined_group
 from perpetua.actors.types import ActorPart
 from perpetua.rooms.types import Material
 
-# Skin is hidden where cloth covers it by more than this: nobody looks further up a sleeve.
-COVERED_MARGIN_M = 0.030
 _HEM_M = 0.022
-_FAR_M = 1.0
-_NECK_HALF_WIDTH_M = 0.078
-_NECK_Z_M = 0.600
 _SHORT_SLEEVE_M = 0.30
-# The middle of the trunk from back to front at some heights.
-_TRUNK_Z_M = (0.0, 0.06, 0.12, 0.18, 0.24, 0.36, 0.42, 0.48, 0.54, 0.60)
-_TRUNK_CENTRE_M = (0.017, 0.016, 0.033, 0.046, 0.060, 0.063, 0.057, 0.034, 0.022, 0.019)
-_TRUNK_RADIUS_M = 0.15
 _ARM_RADIUS_M = 0.055
 _LEG_RADIUS_M = 0.085
+_SKIRT_RADIUS_M = 0.19
+# What a top covers by more than this is left out of trousers: it cannot show, and must not poke through.
+_TUCKED_M = 0.045
 
 
-@dataclass(frozen=True)
-class TopPattern:
-    """A top: length of the sleeves from the shoulder, height of the hem, neckline, and how loose it hangs."""
-
-    sleeve_m: float
-    hem_z_m: float
-    neck_drop_m: float
-    vee: bool
-    collar: str
-    ease_m: float
-    thickness_m: float
-
-
-@dataclass(frozen=True)
-class TrouserPattern:
-    """Trousers: height of waistband and of the legs' ends, and how loose they are at hip and hem."""
-
-    waist_z_m: float
-    leg_z_m: float
-    hip_ease_m: float
-    leg_ease_m: float
-    thickness_m: float
-
-
-def top_field_m(
-    pattern: TopPattern, template_m: Float64[np.ndarray, "P 3"], weights: Float64[np.ndarray, "P J"]
-) -> Float64[np.ndarray, " P"]:
-    """Metres inside the top's cut lines, on the base mesh; negative outside."""
-    arm = arm_share(weights)
-    sleeve = np.where(arm > 0.4, pattern.sleeve_m - along_arm_m(template_m), _FAR_M)
-    hem = np.where(arm > 0.4, _FAR_M, template_m[:, 2] - pattern.hem_z_m)
-    neck = _neckline_field_m(pattern, template_m)
-    return np.minimum(np.minimum(sleeve, hem), neck)
-
-
-def _neckline_field_m(pattern: TopPattern, template_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, " P"]:
-    """About metres outside an opening around the neck that is deeper in front than at the nape."""
-    side = np.abs(template_m[:, 1]) / _NECK_HALF_WIDTH_M
-    front = np.clip((template_m[:, 0] + 0.06) / 0.13, 0.0, 1.0)
-    drop_m = 0.012 + (pattern.neck_drop_m - 0.012) * front * front * (3.0 - 2.0 * front)
-    below = np.maximum(_NECK_Z_M - template_m[:, 2], 0.0) / drop_m
-    round_, pointed = np.hypot(side, below), side + below
-    opening = (1.0 - front) * round_ + front * pointed if pattern.vee else round_
-    return np.asarray((opening - 1.0) * _NECK_HALF_WIDTH_M)
-
-
-def trouser_field_m(
-    pattern: TrouserPattern, template_m: Float64[np.ndarray, "P 3"], weights: Float64[np.ndarray, "P J"]
-) -> Float64[np.ndarray, " P"]:
-    """Metres inside the trousers' cut lines, on the base mesh; negative outside."""
-    height = template_m[:, 2]
-    inside = np.minimum(pattern.waist_z_m - height, height - pattern.leg_z_m)
-    return np.where(arm_share(weights) > 0.3, -_FAR_M, inside)
-
-
-def covered_by(field_m: Float64[np.ndarray, " P"]) -> Bool[np.ndarray, " P"]:
-    """Vertices that a garment hides for good."""
-    return np.asarray(field_m > COVERED_MARGIN_M)
-
-
-def material(name: str, fabric: Fabric) -> Material:
-    """The material of a fabric; meshes' UVs are in tiles of it."""
+def _material(name: str, fabric: Fabric) -> Material:
     return Material(name=name, base_color=(0.5, 0.5, 0.5), roughness=fabric.roughness, image=fabric.image)
 
 
@@ -119,103 +57,119 @@ def _eased_weights(surface: Surface, passes: int) -> Float64[np.ndarray, "P J"]:
     return weights
 
 
-def _side(template_m: Float64[np.ndarray, "P 3"], faces: Int32[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
-    return np.asarray(template_m[faces, 1].mean(axis=1) > 0)
+def _edged(surface: Surface, field_m: Float64[np.ndarray, " P"]) -> Float64[np.ndarray, " P"]:
+    """The field with exact zeros on the cut edges and nowhere else."""
+    edged = np.maximum(field_m, 1e-5)
+    edged[border_edges(surface.faces).ravel()] = 0.0
+    return edged
 
 
-def _limb_uv(surface: Surface, chain: tuple[str, str], radius_m: float, seam: Float64[np.ndarray, "3"]) -> np.ndarray:
-    """Both sides' limbs unrolled; a face belongs to the side of the body it is on."""
-    joints = template_joints()
-    uv = np.empty((len(surface.faces), 3, 2), dtype=np.float32)
-    left = _side(surface.template_m, surface.faces)
-    for side, chosen, mirror in (("left", left, 1.0), ("right", ~left, -1.0)):
-        start, end = (joints[joint_index(f"{side}_{name}")] for name in chain)
-        unrolled = around(
-            surface.template_m, surface.faces[chosen], start, end, seam * np.array([1.0, mirror, 1.0]), radius_m
-        )
-        uv[chosen] = unrolled
-    return uv
+def _folded(
+    surface: Surface, depth_m: Float64[np.ndarray, " P"], across: tuple[float, float, float], rng: np.random.Generator
+) -> Surface:
+    """The cloth with folds of the given depth that run square to ``across``."""
+    height_m = wrinkles(surface.template_m, np.array(across), rng) * depth_m
+    return replace(surface, vertices_m=surface.vertices_m + height_m[:, None] * smooth_normals(surface))
 
 
-def _top_uv(surface: Surface, arm: Bool[np.ndarray, " F"]) -> Float32[np.ndarray, "F 3 2"]:
-    # As if the trunk were a straight cylinder: centred at each height, as deep as wide.
-    centre_m = np.interp(surface.template_m[:, 2], _TRUNK_Z_M, _TRUNK_CENTRE_M)
-    straight_m = surface.template_m.copy()
-    straight_m[:, 0] = (straight_m[:, 0] - centre_m) * 1.35
-    hips, neck = np.zeros(3), np.array([0.0, 0.0, 0.6])
-    uv = around(straight_m, surface.faces, neck, hips, np.array([-1.0, 0.0, 0.0]), _TRUNK_RADIUS_M)
-    uv[arm] = _limb_uv(surface, ("shoulder", "wrist"), _ARM_RADIUS_M, np.array([0.0, -0.7, -0.7]))[arm]
-    return uv
-
-
-def _top_ease(pattern: TopPattern, surface: Surface) -> Float64[np.ndarray, " P"]:
-    """Snug on the shoulders, looser below the chest, wider towards the sleeves' ends."""
+def _top_ease_m(pattern: TopPattern, surface: Surface) -> Float64[np.ndarray, " P"]:
+    """Snug on the shoulders, looser below the chest, wider towards the ends of short sleeves."""
     height = surface.template_m[:, 2]
-    trunk = np.interp(height, [0.0, 0.2, 0.4, 0.52], [1.25, 1.5, 0.8, 0.3])
+    body = np.interp(height, [0.0, 0.2, 0.4, 0.48, 0.54], [1.35, 1.5, 0.8, 0.4, 0.2])
     along = along_arm_m(surface.template_m) / max(pattern.sleeve_m, 0.1)
     end = 0.85 if pattern.sleeve_m < _SHORT_SLEEVE_M else 0.45
-    sleeve = np.interp(along, [0.0, 0.3, 0.7, 1.0], [0.3, 0.7, 0.9, end])
+    sleeve = np.interp(along, [0.0, 0.3, 0.7, 1.0], [0.25, 0.7, 0.9, end])
     arm = arm_share(surface.weights)
-    return pattern.ease_m * ((1.0 - arm) * trunk + arm * sleeve)
+    return pattern.ease_m * ((1.0 - arm) * body + arm * sleeve)
 
 
 def sew_top(wearer: Wearer, pattern: TopPattern, fabric: Fabric, rng: np.random.Generator) -> Piece:
     """A top on this body."""
     tights = refined_group(wearer, "helper-tights")
     cut, _ = positive(tights, top_field_m(pattern, tights.template_m, tights.weights))
-    # The armhole is a seam: the cloth is cut there so that each side has its own grain.
-    seamed, arm_field = split(cut, arm_share(cut.weights) - 0.5)
-    field_m = np.maximum(top_field_m(pattern, seamed.template_m, seamed.weights), 0.0)
-    ease_m = _top_ease(pattern, seamed)
-    cloth_m = draped(seamed, ease_m, Drape(gap_m=0.35 * pattern.ease_m + 0.002, passes=40, hold=0.06))
-    folds = wrinkles(seamed.template_m, np.array([0.2, 0.3, 0.9]), rng)
+    # Armholes, sides and shoulders are seams: cloth is cut there, so that each panel has its own grain.
+    cut, _ = split(cut, arm_share(cut.weights) - 0.5)
+    seamed, _ = split(cut, front_m(cut.template_m))
+    field_m = _edged(seamed, top_field_m(pattern, seamed.template_m, seamed.weights))
+    ease_m = _top_ease_m(pattern, seamed)
+    hold = np.interp(seamed.template_m[:, 2], [0.38, 0.50], [0.06, 0.30])
+    gap_m = 0.30 * pattern.ease_m + 0.002 + 0.006 * np.clip((0.10 - seamed.template_m[:, 2]) / 0.1, 0.0, 1.0)
+    cloth_m = draped(seamed, ease_m, Drape(gap_m=gap_m, passes=40, hold=hold))
     depth_m = 0.28 * ease_m * np.clip(field_m / 0.05, 0.0, 1.0)
-    cloth_m += (folds * depth_m)[:, None] * smooth_normals(replace(seamed, vertices_m=cloth_m))
-    weights = _onto(_eased_weights(seamed, 6), {"wrist": ("forearm", 0.9)})
-    outside = Surface(seamed.template_m, cloth_m, weights, seamed.faces)
-    field_m = _edge_field(outside, field_m)
-    sewn, _, outer = hemmed(outside, field_m, _HEM_M, pattern.thickness_m)
-    arm_faces = np.zeros(len(sewn.faces), dtype=bool)
-    on_arm = np.concatenate([arm_field, np.zeros(len(sewn.vertices_m) - len(arm_field))])
-    arm_faces[:outer] = on_arm[sewn.faces[:outer]].mean(axis=1) > 0
-    arm_faces[outer:] = arm_share(sewn.weights)[sewn.faces[outer:]].mean(axis=1) > 0.5
-    uv = _top_uv(sewn, arm_faces) / np.float32(fabric.tile_m)
-    top = Piece(sewn.vertices_m, sewn.weights, (ActorPart("top", sewn.faces, uv, material("top", fabric)),))
-    return collar(top, outside, field_m, pattern.collar, fabric)
+    folded = _folded(replace(seamed, vertices_m=cloth_m), depth_m, (0.2, 0.3, 0.9), rng)
+    outside = replace(folded, weights=_onto(_eased_weights(seamed, 6), {"wrist": ("forearm", 0.9)}))
+    sewn = hemmed(outside, field_m, _HEM_M, pattern.thickness_m)
+    on_arm = arm_share(_template_weights(sewn, seamed))[sewn.faces].mean(axis=1) > 0.5
+    uv = trunk(sewn)
+    uv[on_arm] = limbs(sewn, ("shoulder", "wrist"), _ARM_RADIUS_M, (0.0, -0.7, -0.7))[on_arm]
+    part = ActorPart("top", sewn.faces, uv / np.float32(fabric.tile_m), _material("top", fabric))
+    return collar(Piece(sewn.vertices_m, sewn.weights, (part,)), outside, pattern.collar, fabric)
 
 
-def _edge_field(surface: Surface, field_m: Float64[np.ndarray, " P"]) -> Float64[np.ndarray, " P"]:
-    """The field with zeros on every border vertex, so that hems are turned in all along."""
-    exact = field_m.copy()
-    exact[np.abs(exact) < 1e-6] = 0.0
-    return exact
+def _template_weights(sewn: Surface, seamed: Surface) -> Float64[np.ndarray, "P J"]:
+    """The sewn cloth's weights before they were eased, on its outer side; armholes are seams of those."""
+    return np.concatenate([seamed.weights, sewn.weights[len(seamed.weights) :]])
 
 
-def sew_trousers(wearer: Wearer, pattern: TrouserPattern, fabric: Fabric, rng: np.random.Generator) -> Piece:
-    """Trousers (or shorts) on this body."""
+def sew_trousers(
+    wearer: Wearer, pattern: TrouserPattern, top: TopPattern, fabric: Fabric, rng: np.random.Generator
+) -> Piece:
+    """Trousers (or shorts) on this body, worn under the top."""
     tights = refined_group(wearer, "helper-tights")
     cut, _ = positive(tights, trouser_field_m(pattern, tights.template_m, tights.weights))
+    # One leg each side of the middle seam.
     seamed, _ = split(cut, cut.template_m[:, 1])
-    field_m = np.maximum(trouser_field_m(pattern, seamed.template_m, seamed.weights), 0.0)
-    height = seamed.template_m[:, 2]
+    field_m = _edged(seamed, trouser_field_m(pattern, seamed.template_m, seamed.weights))
     hip, leg = pattern.hip_ease_m, pattern.leg_ease_m
-    ease_m = np.interp(height, [-0.75, -0.5, -0.25, -0.02, 0.15], [1.15 * leg, leg, 0.8 * leg, hip, 0.5 * hip])
-    cloth_m = draped(seamed, ease_m, Drape(gap_m=0.4 * hip, passes=60, hold=0.04))
-    depth_m = np.interp(height, [-0.76, -0.66, -0.5, -0.36, -0.2, 0.0], [0.005, 0.004, 0.0015, 0.004, 0.001, 0.002])
-    folds = wrinkles(seamed.template_m, np.array([0.25, 0.15, 0.9]), rng)
+    below = along_leg_m(seamed.template_m)
+    ease_m = np.interp(below, [-0.1, 0.05, 0.3, 0.55, 0.8], [0.5 * hip, hip, 0.8 * leg, leg, 1.1 * leg])
+    cloth_m = draped(seamed, ease_m, Drape(np.full(len(ease_m), 0.4 * hip), passes=60, hold=np.full(len(ease_m), 0.04)))
+    depth_m = np.interp(below, [0.0, 0.2, 0.4, 0.55, 0.7, 0.8], [0.002, 0.001, 0.004, 0.0015, 0.004, 0.005])
     depth_m *= np.clip(field_m / 0.04, 0.0, 1.0) * leg / 0.02
-    cloth_m += (folds * depth_m)[:, None] * smooth_normals(replace(seamed, vertices_m=cloth_m))
+    folded = _folded(replace(seamed, vertices_m=cloth_m), depth_m, (0.25, 0.15, 0.9), rng)
     weights = _onto(_eased_weights(seamed, 6), {"foot": ("ankle", 1.0), "ankle": ("knee", 0.75)})
-    outside = Surface(seamed.template_m, cloth_m, weights, seamed.faces)
-    sewn, _, _ = hemmed(outside, _edge_field(outside, field_m), _HEM_M, pattern.thickness_m)
-    uv = _limb_uv(sewn, ("hip", "ankle"), _LEG_RADIUS_M, np.array([0.1, -1.0, 0.0])) / np.float32(fabric.tile_m)
-    return Piece(sewn.vertices_m, sewn.weights, (ActorPart("trousers", sewn.faces, uv, material("trousers", fabric)),))
+    sewn = hemmed(replace(folded, weights=weights), field_m, _HEM_M, pattern.thickness_m)
+    return _under(top, sewn, limbs(sewn, ("hip", "ankle"), _LEG_RADIUS_M, (0.1, -1.0, 0.0)), fabric, "trousers")
 
 
-def without(piece: Piece, hidden: Bool[np.ndarray, " P"]) -> Piece:
-    """The piece without faces that lie wholly among hidden vertices."""
-    parts = []
-    for part in piece.parts:
-        seen = ~np.all(hidden[part.faces], axis=1)
-        parts.append(ActorPart(part.name, part.faces[seen], part.uv[seen], part.material))
-    return Piece(piece.vertices_m, piece.weights, tuple(parts))
+def _under(top: TopPattern, sewn: Surface, uv: np.ndarray, fabric: Fabric, name: str) -> Piece:
+    """A finished garment without the faces that the top hides."""
+    tucked = top_field_m(top, sewn.template_m, sewn.weights) > _TUCKED_M
+    shown = ~np.all(tucked[sewn.faces], axis=1)
+    part = ActorPart(name, sewn.faces[shown], uv[shown] / np.float32(fabric.tile_m), _material(name, fabric))
+    return Piece(sewn.vertices_m, sewn.weights, (part,))
+
+
+def sew_skirt(
+    wearer: Wearer, pattern: SkirtPattern, top: TopPattern, fabric: Fabric, rng: np.random.Generator
+) -> Piece:
+    """A skirt on this body, worn under the top."""
+    helper = refined_group(wearer, "helper-skirt")
+    cut, _ = positive(helper, skirt_field_m(pattern, helper.template_m, helper.weights))
+    field_m = _edged(cut, skirt_field_m(pattern, cut.template_m, cut.weights))
+    outward = smooth_normals(cut)
+    eased_m = cut.vertices_m + (pattern.hip_ease_m * outward)
+    depth_m = np.interp(cut.template_m[:, 2], [pattern.hem_z_m, 0.0, 0.1], [0.010, 0.003, 0.0])
+    folded = _folded(replace(cut, vertices_m=eased_m), depth_m, (0.5, 0.8, 0.0), rng)
+    sewn = hemmed(replace(folded, weights=_skirt_weights(cut)), field_m, _HEM_M, pattern.thickness_m)
+    middle = np.array([0.02, 0.0, 0.1])
+    uv = around(
+        sewn.template_m,
+        sewn.faces,
+        middle,
+        middle - np.array([0.0, 0.0, 1.0]),
+        np.array([-1.0, 0.0, 0.0]),
+        _SKIRT_RADIUS_M,
+    )
+    return _under(top, sewn, uv, fabric, "skirt")
+
+
+def _skirt_weights(surface: Surface) -> Float64[np.ndarray, "P J"]:
+    """A skirt hangs from the pelvis and is carried along by both thighs, on each side mostly by its own."""
+    down = np.clip((0.02 - surface.template_m[:, 2]) / 0.30, 0.0, 1.0)
+    left = np.clip(0.5 + surface.template_m[:, 1] / 0.16, 0.0, 1.0)
+    weights = np.zeros_like(surface.weights)
+    weights[:, joint_index("pelvis")] = 1.0 - 0.9 * down
+    weights[:, joint_index("left_hip")] = 0.9 * down * left
+    weights[:, joint_index("right_hip")] = 0.9 * down * (1.0 - left)
+    return weights

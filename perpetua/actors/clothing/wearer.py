@@ -20,7 +20,6 @@ class Wearer:
     """A shaped body: all base mesh vertices in MakeHuman's rest pose, helper geometry included."""
 
     vertices_m: Float64[np.ndarray, "P 3"]
-    female: bool
 
 
 def share_of(weights: Float64[np.ndarray, "P J"], joints: tuple[str, ...]) -> Float64[np.ndarray, " P"]:
@@ -40,15 +39,25 @@ def template_joints() -> Float64[np.ndarray, "22 3"]:
     return rest_joints(base_mesh().vertices_m)
 
 
+def _along_m(template_m: Float64[np.ndarray, "P 3"], chain: tuple[str, str, str]) -> Float64[np.ndarray, " P"]:
+    """Distance from the first joint of a left limb along its two bones; the right one is its mirror image."""
+    mirrored = np.stack([template_m[:, 0], np.abs(template_m[:, 1]), template_m[:, 2]], axis=1)
+    start, middle, end = (template_joints()[joint_index(f"left_{name}")] for name in chain)
+    upper, lower = middle - start, end - middle
+    length = float(np.linalg.norm(upper))
+    upper, lower = upper / length, lower / np.linalg.norm(lower)
+    beyond = (mirrored - middle) @ (upper + lower) > 0
+    return np.where(beyond, length + (mirrored - middle) @ lower, (mirrored - start) @ upper)
+
+
 def along_arm_m(template_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, " P"]:
     """Distance from the shoulder along upper arm and forearm on the base mesh; both arms alike."""
-    mirrored = template_m * np.array([1.0, 0.0, 1.0]) + np.abs(template_m) * np.array([0.0, 1.0, 0.0])
-    shoulder, elbow, wrist = (template_joints()[joint_index(f"left_{name}")] for name in ("shoulder", "elbow", "wrist"))
-    upper, fore = elbow - shoulder, wrist - elbow
-    length = float(np.linalg.norm(upper))
-    upper, fore = upper / length, fore / np.linalg.norm(fore)
-    beyond = (mirrored - elbow) @ (upper + fore) > 0
-    return np.where(beyond, length + (mirrored - elbow) @ fore, (mirrored - shoulder) @ upper)
+    return _along_m(template_m, ("shoulder", "elbow", "wrist"))
+
+
+def along_leg_m(template_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, " P"]:
+    """Distance from the hip along thigh and shin on the base mesh; both legs alike. The ankle is at 0.81 m."""
+    return _along_m(template_m, ("hip", "knee", "ankle"))
 
 
 @lru_cache(maxsize=4)
