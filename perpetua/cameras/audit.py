@@ -73,9 +73,7 @@ def audit_paths(
         position_m = path.world_from_camera[:, :3, 3]
         swept = _sweep(position_m)
         scene_m.append(float(caster.closest_distance(swept.position_m, 10.0).min()))
-        actor_m.append(
-            min((_actor_distance_m(swept, actor, config.actor_clearance_m) for actor in actors), default=np.inf)
-        )
+        actor_m.append(min(_actor_distance_m(swept, actor) for actor in actors))
         travel_m.append(float(np.linalg.norm(np.diff(position_m, axis=0), axis=1).sum()))
         figures = _figures(path, swept, room, fps) | {
             "scene": scene_m[-1],
@@ -105,18 +103,22 @@ def _sweep(position_m: Float64[np.ndarray, "T 3"]) -> _Sweep:
     return _Sweep(between, frame, share)
 
 
-def _actor_distance_m(swept: _Sweep, actor: ActorMesh, limit_m: float) -> float:
-    """Least distance to an actor's triangles; only sub-steps whose bounding box is within 3 limits are measured."""
+def _actor_distance_m(swept: _Sweep, actor: ActorMesh) -> float:
+    """Least distance to an actor's triangles over all sub-steps."""
     low_m, high_m = actor.vertices_m.min(axis=1), actor.vertices_m.max(axis=1)
     low_m = np.minimum(low_m[swept.frame], low_m[swept.frame + 1])
     high_m = np.maximum(high_m[swept.frame], high_m[swept.frame + 1])
     beyond = np.maximum(np.maximum(low_m - swept.position_m, swept.position_m - high_m), 0.0)
     box_m = np.linalg.norm(beyond, axis=1)
-    nearest_m = float(box_m.min()) if box_m.min() >= 3.0 * limit_m else np.inf
-    for step in np.flatnonzero(box_m < 3.0 * limit_m):
+    faces = actor.faces
+    nearest_m = np.inf
+    for step in np.argsort(box_m, kind="stable"):
+        # The mesh lies within its box: no later sub-step can come nearer.
+        if box_m[step] >= nearest_m:
+            break
         frame, share = swept.frame[step], swept.share[step]
         vertices_m = (1.0 - share) * actor.vertices_m[frame] + share * actor.vertices_m[frame + 1]
-        nearest_m = min(nearest_m, _mesh_distance_m(swept.position_m[step], vertices_m, actor.faces))
+        nearest_m = min(nearest_m, _mesh_distance_m(swept.position_m[step], vertices_m, faces))
     return nearest_m
 
 

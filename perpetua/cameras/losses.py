@@ -10,7 +10,6 @@ from torch import Tensor
 
 REVISIT_REACH_M = 0.35
 REVISIT_AFTER_S = 2.5
-SEEN_SOFTNESS = 0.15
 
 
 def field_distance(
@@ -56,11 +55,8 @@ def framing(
     weight: Float[Tensor, "S C T A L"],
     margin: float,
 ) -> Float[Tensor, " S"]:
-    """How far focus points lie outside the image less a margin, as an angle's sine: it also turns views around."""
-    reach = (1.0 - margin) * tan_half_fov[:, :, None, None, None] * point_camera_m[..., 2:]
-    beyond = torch.relu(point_camera_m[..., :2].abs() - reach)
-    distance = point_camera_m.square().sum(-1, keepdim=True).add(1e-6).sqrt()
-    outside = (beyond / distance).square().sum(-1)
+    """How far focus points lie outside the image less a margin; also defined, and steep, behind the camera."""
+    outside = _outside(point_camera_m, tan_half_fov[:, :, None, None, None], margin)
     return _per_candidate((outside * weight).sum((-1, -2)))
 
 
@@ -81,14 +77,11 @@ def size(
 
 
 def coverage(
-    chest_camera_m: Float[Tensor, "S C T A 3"], tan_half_fov: Float[Tensor, "S C 2"], views: int
+    chest_camera_m: Float[Tensor, "S C T A 3"], tan_half_fov: Float[Tensor, "S C 2"], views: int, margin: float
 ) -> Float[Tensor, " S"]:
-    """Actors that fewer than ``views`` views have inside their image."""
-    depth = chest_camera_m[..., 2:].clamp_min(0.05)
-    image = (chest_camera_m[..., :2] / (depth * tan_half_fov[:, :, None, None])).abs().amax(-1)
-    in_front = torch.sigmoid((chest_camera_m[..., 2] - 0.3) / 0.1)
-    seen = torch.sigmoid((0.9 - image) / SEEN_SOFTNESS) * in_front
-    return (torch.relu(views - seen.sum(1)) / views).square().mean((-1, -2))
+    """How far each actor's chest lies outside the images of the ``views`` views that come nearest to showing it."""
+    outside = _outside(chest_camera_m, tan_half_fov[:, :, None, None], margin)
+    return outside.topk(views, dim=1, largest=False).values.mean((1, 2, 3))
 
 
 def occlusion(line_distance_m: Float[Tensor, "S C T P R"], wanted_m: float) -> Float[Tensor, " S"]:
@@ -166,6 +159,16 @@ def outside_band(
     """Values below or above a wished band, in units of ``unit``."""
     beyond = torch.relu(low[..., None] - values) + torch.relu(values - high[..., None])
     return _per_candidate((beyond / unit).square())
+
+
+def _outside(
+    point_camera_m: Float[Tensor, "*batch 3"], tan_half_fov: Float[Tensor, "*fov 2"], margin: float
+) -> Float[Tensor, "*batch"]:
+    """Squared sine of the angle, roughly, between a point and the image less a margin; it grows up to behind."""
+    reach = (1.0 - margin) * tan_half_fov * point_camera_m[..., 2:]
+    beyond = torch.relu(point_camera_m[..., :2].abs() - reach)
+    distance = point_camera_m.square().sum(-1, keepdim=True).add(1e-6).sqrt()
+    return (beyond / distance).square().sum(-1)
 
 
 def _per_candidate(values: Float[Tensor, " S *rest"]) -> Float[Tensor, " S"]:

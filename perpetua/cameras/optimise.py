@@ -12,20 +12,21 @@ from perpetua.cameras import losses
 from perpetua.cameras.bodies import ActorBounds
 from perpetua.cameras.config import CamerasConfig
 from perpetua.cameras.types import SignedDistanceField
-from perpetua.optimisation import minimise
+from perpetua.optimisation import deterministic_torch, minimise
 
 DEGREE = 3
 CONTROL_S = 0.6
 LEARNING_RATE_M = 0.02
 MARGIN = 0.15
+COVERING_VIEWS = 2
 LINE_SAMPLES = 20
 LINE_POINTS = 2
 LINE_WANTED_M = 0.12
 CROWD_WANTED_M = 0.3
 CROWD_POINTS = 3
-# What the field, the sub-steps of the audit and the sway may add up to.
+# What the field and the sub-steps of the audit may add up to; actors that fill the image are kept further off.
 SCENE_SPARE_M = 0.08
-ACTOR_SPARE_M = 0.08
+ACTOR_SPARE_M = 0.25
 # The optimiser keeps well within the limits that the audit enforces.
 SOFT_SHARE = 0.6
 LEAST_APART_RAD = np.radians(50.0)
@@ -63,8 +64,7 @@ def optimise_paths(problem: Problem, config: CamerasConfig) -> Solution:
     """Minimises all losses over all candidates; candidates do not influence each other."""
     times = problem.start_m.shape[2]
     basis = spline_basis(np.linspace(0.0, 1.0, times), problem.step_s * (times - 1))
-    fitted = np.einsum("kt,scti->scki", np.linalg.pinv(basis), problem.start_m)
-    position = torch.tensor(fitted, dtype=torch.float32, requires_grad=True)
+    position = torch.tensor(_controls_along(problem.start_m, basis.shape[1]), dtype=torch.float32, requires_grad=True)
     offset = torch.zeros_like(position, requires_grad=True)
     terms = _Terms(problem, config, basis)
     minimise(
@@ -73,7 +73,7 @@ def optimise_paths(problem: Problem, config: CamerasConfig) -> Solution:
         config.steps,
         LEARNING_RATE_M,
     )
-    with torch.no_grad():
+    with torch.no_grad(), deterministic_torch():
         final = {name: value.double().numpy() for name, value in terms(position, offset).items()}
     return Solution(
         position.detach().double().numpy(),
@@ -86,9 +86,20 @@ def optimise_paths(problem: Problem, config: CamerasConfig) -> Solution:
 def spline_basis(share: Float64[np.ndarray, " T"], duration_s: float) -> Float64[np.ndarray, "T K"]:
     """Weights of a clamped cubic B-spline's control points at shares (0 to 1) of a duration."""
     controls = max(DEGREE + 1, int(np.ceil(duration_s / CONTROL_S)) + DEGREE)
-    inner = np.linspace(0.0, 1.0, controls - DEGREE + 1)
-    knots = np.concatenate([np.zeros(DEGREE), inner, np.ones(DEGREE)])
-    return np.asarray(BSpline.design_matrix(share, knots, DEGREE).toarray())
+    return np.asarray(BSpline.design_matrix(share, _knots(controls), DEGREE).toarray())
+
+
+def _knots(controls: int) -> Float64[np.ndarray, " M"]:
+    return np.concatenate([np.zeros(DEGREE), np.linspace(0.0, 1.0, controls - DEGREE + 1), np.ones(DEGREE)])
+
+
+def _controls_along(path_m: Float64[np.ndarray, "S C T 3"], controls: int) -> Float64[np.ndarray, "S C K 3"]:
+    """Control points on a path at the spline's Greville sites: the spline then keeps to the path's shape."""
+    knots = _knots(controls)
+    site = np.mean([knots[1 + i : 1 + i + controls] for i in range(DEGREE)], axis=0) * (path_m.shape[2] - 1)
+    low = np.minimum(site.astype(int), path_m.shape[2] - 2)
+    share = (site - low)[:, None]
+    return (1.0 - share) * path_m[:, :, low] + share * path_m[:, :, low + 1]
 
 
 class _Terms:
@@ -157,7 +168,9 @@ class _Terms:
             "size": losses.size(
                 distance_m, self.top_m - self.bottom_m, self.tan_half_fov, least, most, self.focus_weight
             ),
-            "coverage": losses.coverage(in_camera_m[..., 1, :], self.tan_half_fov, min(2, position_m.shape[1])),
+            "coverage": losses.coverage(
+                in_camera_m[..., 1, :], self.tan_half_fov, min(COVERING_VIEWS, position_m.shape[1]), MARGIN
+            ),
             "occlusion": losses.occlusion(line_distance_m, LINE_WANTED_M),
             "crowding": losses.crowding(
                 position_m, self.watched_m[..., 1, :], self.point_m[:, :, :CROWD_POINTS], self.other, CROWD_WANTED_M

@@ -106,7 +106,7 @@ def make_camera_plan(
     nearest: CameraAudit | None = None
     for redraw in range(config.max_redraws + 1):
         wishes = [
-            draw_wishes(seed, redraw, candidate, scene.bounds, room.height_m, frames / fps, config)
+            draw_wishes(seed, redraw, candidate, scene.bounds, room.height_m, float(scene.times_s[-1]), config)
             for candidate in range(config.candidates)
         ]
         problem = _pose_problem(scene, wishes, config, seed, redraw)
@@ -196,8 +196,8 @@ def _paths(scene: _Scene, wishes: tuple[ViewWish, ...], solution: Solution, cand
     paths = []
     for view, wish in enumerate(wishes):
         sway = wish.sway.at(times_s)
-        position_m = basis @ solution.position_control_m[candidate, view] + sway[:, :3]
-        target_m = _focus_m(scene, wish) + basis @ solution.offset_control_m[candidate, view]
+        position_m = np.einsum("tk,ki->ti", basis, solution.position_control_m[candidate, view]) + sway[:, :3]
+        target_m = _focus_m(scene, wish) + np.einsum("tk,ki->ti", basis, solution.offset_control_m[candidate, view])
         intrinsics = Intrinsics.centred(scene.width_px, scene.height_px, wish.fov_rad)
         paths.append(CameraPath(wish.camera, _swayed(position_m, target_m, sway[:, 3:]), intrinsics))
     return tuple(paths)
