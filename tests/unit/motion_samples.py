@@ -21,7 +21,7 @@ _JOINTS = {
     "left_elbow": (-0.02, 0.43, 1.37),
     "left_wrist": (-0.01, 0.67, 1.37),
 }
-ROUTE_KINDS = ("stand", "straight", "curve", "spot", "slow", "brisk", "sideways", "backwards", "random")
+ROUTE_KINDS = ("stand", "straight", "curve", "spot", "slow", "brisk", "sideways", "backwards", "oblique", "random")
 
 
 def sample_skeleton(height_m: float = 1.7) -> Skeleton:
@@ -33,7 +33,7 @@ def sample_skeleton(height_m: float = 1.7) -> Skeleton:
     return Skeleton(joint_m, contact_m * height_m / 1.7)
 
 
-def sample_route(kind: str, fps: float, seconds: float = 5.0, actor: int = 0) -> Route:
+def sample_route(kind: str, fps: float, seconds: float = 4.5, actor: int = 0) -> Route:
     """A route of a kind, the same curve at any frame rate."""
     time_s = np.linspace(0.0, seconds, 2001)
     along_rad, speed_mps, heading_rad = np.zeros(2001), np.zeros(2001), np.zeros(2001)
@@ -52,6 +52,8 @@ def sample_route(kind: str, fps: float, seconds: float = 5.0, actor: int = 0) ->
         speed_mps, along_rad = 0.4 * ramp, np.full(2001, 0.5 * np.pi)
     elif kind == "backwards":
         speed_mps, along_rad = 0.5 * ramp, np.full(2001, np.pi)
+    elif kind == "oblique":
+        speed_mps, along_rad = 1.4 * ramp, np.full(2001, -0.6)
     elif kind == "random":
         speed_mps = 0.75 + 0.7 * np.sin(1.7 * time_s) * np.cos(0.6 * time_s + actor)
         heading_rad = 1.5 * np.sin(0.9 * time_s + actor) + 0.5 * np.sin(2.3 * time_s)

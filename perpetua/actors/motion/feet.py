@@ -10,7 +10,7 @@ from perpetua.actors.motion.rotations import about_y, about_z, rotate
 
 # At a brisk stride of this length the foot lands and leaves at these pitches (nose down is positive).
 _FULL_STRIDE_M = 1.3
-_LANDING_PITCH_RAD = -0.33
+_LANDING_PITCH_RAD = -0.27
 _LEAVING_PITCH_RAD = 1.15
 _LEAST_LEAVING_PITCH_RAD = 0.22
 _LANDING_S = 0.13

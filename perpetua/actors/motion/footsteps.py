@@ -12,10 +12,11 @@ LEFT, RIGHT = 0, 1
 # A foot steps again when it would land this far from where it stands, or turned by this much (25 degrees).
 _POSITION_TOLERANCE_M = 0.09
 _TURN_TOLERANCE_RAD = 0.436
-_DECISION_S = 0.02
+_DECISION_S = 0.04
 # Sole to sole, between the lines through both ankles.
 _LEAST_FOOT_GAP_M = 0.085
 _PASSING_GAP_M = 0.105
+_FARTHEST_ASIDE_M = 0.15
 _FOOT_LENGTH_M = 0.27
 # When in its stance a foot has the body over its ankle: before half, as the second half is spent rolling over the ball.
 _BODY_OVER_ANKLE = 0.41
@@ -154,7 +155,7 @@ class FootstepPlanner:
         outward = 1.0 if side == LEFT else -1.0
         _, left = _axes(yaw_rad)
         gap_m = outward * float((position_m[:2] - other.position_m[:2]) @ left)
-        position_m[:2] += max(0.0, _LEAST_FOOT_GAP_M - gap_m) * outward * left
+        position_m[:2] += float(np.clip(_LEAST_FOOT_GAP_M - gap_m, 0.0, _FARTHEST_ASIDE_M)) * outward * left
         aside = outward * _axes(0.5 * (old.yaw_rad + yaw_rad))[1]
         dodge_m = _passing_room_m(old.position_m[:2], position_m[:2], other.position_m[:2], aside) * aside
         return Plant(position_m, yaw_rad, land_s, np.inf, dodge_m)

@@ -38,8 +38,9 @@ class RoutePath:
         rate = np.gradient(raw, self._grid_s, axis=0)
         self._speed_mps = gaussian_filter1d(np.hypot(rate[:, 0], rate[:, 1]), 0.12 * _GRID_HZ)
         self._turn_rps = gaussian_filter1d(np.abs(rate[:, 3]), 0.15 * _GRID_HZ)
+        heading_rad = raw[:, 3] + _turn_to_travel_rad(rate[:, :2], self._speed_mps, raw[:, 3])
         # A pelvis turns softly: the route's heading may have corners.
-        self._heading_rad = gaussian_filter1d(raw[:, 3], 0.08 * _GRID_HZ, mode="nearest")
+        self._heading_rad = gaussian_filter1d(heading_rad, 0.1 * _GRID_HZ, mode="nearest")
         velocity = np.column_stack([gaussian_filter1d(rate[:, axis], 0.15 * _GRID_HZ) for axis in (0, 1)])
         self._acceleration_mps2 = np.gradient(velocity, self._grid_s, axis=0)
 
@@ -57,7 +58,7 @@ class RoutePath:
         return self._evaluate(time_s)[:, :3]
 
     def heading_rad(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
-        """Heading about Z, without jumps of a full turn."""
+        """Heading of the body about Z, without jumps of a full turn: the route's, or the way when walking at pace."""
         return np.interp(time_s, self._grid_s, self._heading_rad)
 
     def speed_mps(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
@@ -73,3 +74,16 @@ class RoutePath:
         ahead = self.heading_rad(time_s)
         along_x, along_y = (np.interp(time_s, self._grid_s, self._acceleration_mps2[:, axis]) for axis in (0, 1))
         return np.asarray(along_x * np.cos(ahead) + along_y * np.sin(ahead))
+
+
+def _turn_to_travel_rad(
+    velocity_mps: Float64[np.ndarray, "N 2"],
+    speed_mps: Float64[np.ndarray, " N"],
+    heading_rad: Float64[np.ndarray, " N"],
+) -> Float64[np.ndarray, " N"]:
+    """How far a body turns from its heading to where it goes: nobody walks obliquely, except slowly or backwards."""
+    away_rad = np.arctan2(velocity_mps[:, 1], velocity_mps[:, 0]) - heading_rad
+    away_rad = (away_rad + np.pi) % (2.0 * np.pi) - np.pi
+    at_pace = np.clip((speed_mps - 0.35) / 0.4, 0.0, 1.0)
+    forwards = np.clip((2.1 - np.abs(away_rad)) / 0.8, 0.0, 1.0)
+    return at_pace * forwards * away_rad
