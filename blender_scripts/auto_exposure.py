@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Automatic exposure: metered on small test renders like a camera's meter, then constant over the sequence."""
+"""Automatic exposure and white balance: metered on small test renders, then constant over the sequence."""
 
 import json
 import math
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import bpy
@@ -16,6 +17,7 @@ KEY = 0.22
 # The brightest hundredth stays under this, where the view transform still tells tones apart.
 MAX_HIGHLIGHT = 6.0
 LIMIT_EV = 14.0
+MAX_GAIN = 4.0
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -30,16 +32,46 @@ def exposure_ev(linear_rgb: np.ndarray) -> float:
     return max(-LIMIT_EV, min(LIMIT_EV, stops))
 
 
-def read_stored(path: Path) -> float | None:
-    """The exposure that an earlier run of this job settled on, stops."""
+def white_balance(linear_rgb: np.ndarray, strength: float) -> tuple[float, float, float]:
+    """Gains for red, green and blue that take a share (0 to 1) of the picture's colour cast out of it.
+
+    The cast is that of the log-averages (a grey world), in which small bright things count little. The gains keep
+    the luminance of the cast's colour.
+    """
+    lit = linear_rgb[(linear_rgb > 1e-6).all(axis=1)]
+    if len(lit) == 0:
+        return (1.0, 1.0, 1.0)
+    average = np.exp(np.log(lit).mean(axis=0))
+    gains = (float(average @ LUMINANCE) / average) ** strength
+    gains = np.clip(gains, 1.0 / MAX_GAIN, MAX_GAIN)
+    gains *= float(average @ LUMINANCE) / float((gains * average) @ LUMINANCE)
+    return (float(gains[0]), float(gains[1]), float(gains[2]))
+
+
+@dataclass(frozen=True)
+class Development:
+    """How linear light becomes a picture: stops of exposure, and gains of red, green and blue."""
+
+    exposure_ev: float
+    gains: tuple[float, float, float]
+
+
+def develop(linear_rgb: np.ndarray, balance_strength: float) -> Development:
+    """The development that suits metered pixels f[N, 3]."""
+    return Development(exposure_ev(linear_rgb), white_balance(linear_rgb, balance_strength))
+
+
+def read_stored(path: Path) -> Development | None:
+    """What an earlier run of this job settled on."""
     if not path.is_file():
         return None
-    return float(json.loads(path.read_text(encoding="utf-8"))["exposure_ev"])
+    stored = json.loads(path.read_text(encoding="utf-8"))
+    return Development(stored["exposure_ev"], tuple(stored["gains"]))
 
 
-def store(path: Path, stops: float) -> None:
-    """Keeps the exposure for a run that resumes this job."""
-    write_atomically(path, json.dumps({"exposure_ev": stops}).encode())
+def store(path: Path, development: Development) -> None:
+    """Keeps the development for a run that resumes this job."""
+    write_atomically(path, json.dumps(asdict(development)).encode())
 
 
 class TestRender:

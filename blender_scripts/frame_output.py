@@ -23,7 +23,10 @@ class FrameOutput:
         tree.nodes.clear()
         layers = tree.nodes.new("CompositorNodeRLayers")
         picture = tree.nodes.new("CompositorNodeComposite")
-        tree.links.new(layers.outputs["Image"], picture.inputs["Image"])
+        self._gains = tree.nodes.new("CompositorNodeMixRGB")
+        self._gains.blend_type = "MULTIPLY"
+        tree.links.new(layers.outputs["Image"], self._gains.inputs[1])
+        tree.links.new(self._gains.outputs["Image"], picture.inputs["Image"])
         self._file = _exr_node(tree)
         tree.links.new(layers.outputs["Depth"], self._file.inputs["depth"])
         tree.links.new(layers.outputs["IndexOB"], self._file.inputs["index"])
@@ -31,6 +34,10 @@ class FrameOutput:
         image.file_format = "JPEG"
         image.color_mode = "RGB"
         image.quality = jpeg_quality
+
+    def set_gains(self, gains: tuple[float, float, float]) -> None:
+        """Factors of red, green and blue in linear light (white balance)."""
+        self._gains.inputs[2].default_value = (*gains, 1.0)
 
     def render(self, folder: Path, stem: str) -> tuple[Path, Path]:
         """Renders the scene's camera to ``stem``.jpg and ``stem``.exr in a folder."""

@@ -53,7 +53,7 @@ class FrameRenderer:
     def __init__(self, worker: Worker, job: dict, folder: Path) -> None:
         self._worker, self._job, self._folder = worker, job, folder
         arrays = JobArrays(folder)
-        load_room(job["room"], arrays)
+        load_room(job["room"], job["blend_path"], arrays)
         self._actors: list[Actor] = add_actors(job["actors"], arrays)
         self._views = [View(settings, arrays) for settings in job["cameras"]]
         backend, device, warning = cycles_settings.choose_device(job["device"])
@@ -62,21 +62,23 @@ class FrameRenderer:
         worker.emit("device", backend=backend, device=device, warning=warning)
 
     def set_exposure(self) -> None:
-        """The view transform, with the exposure of this job (metered once)."""
+        """The view transform, with the exposure and white balance of this job (metered once)."""
         view = bpy.context.scene.view_settings
         view.view_transform = self._job["settings"]["view_transform"]
         view.look = self._job["settings"]["look"]
         view.gamma = 1.0
         view.use_curve_mapping = False
         path = self._folder / "exposure.json"
-        stops = auto_exposure.read_stored(path)
-        if stops is None:
-            stops = self._meter()
-            auto_exposure.store(path, stops)
-        view.exposure = stops
-        self._worker.emit("ready", exposure_ev=stops)
+        development = auto_exposure.read_stored(path)
+        if development is None:
+            development = auto_exposure.develop(self._meter(), self._job["settings"]["white_balance"])
+            auto_exposure.store(path, development)
+        view.exposure = development.exposure_ev
+        self._output.set_gains(development.gains)
+        self._worker.emit("ready", exposure_ev=development.exposure_ev, gains=development.gains)
 
-    def _meter(self) -> float:
+    def _meter(self) -> np.ndarray:
+        """Linear pixels f32[N, 3] of all views at a few frames."""
         frames = self._job["frames"]
         test = auto_exposure.TestRender(self._folder)
         pixels = []
@@ -86,7 +88,7 @@ class FrameRenderer:
                 view.aim(frame)
                 pixels.append(test.pixels())
                 self._worker.emit("metered", frame=frame)
-        return auto_exposure.exposure_ev(np.concatenate(pixels))
+        return np.concatenate(pixels)
 
     def render(self, frame: int) -> None:
         """Renders all views of a frame and puts its folder in place."""

@@ -15,16 +15,16 @@ SKY_COLOR = (0.72, 0.85, 1.0)
 SKY_RADIANCE = 1.5
 
 
-def load_room(room: dict, arrays: JobArrays) -> None:
+def load_room(room: dict, blend_path: str | None, arrays: JobArrays) -> None:
     """Makes the scene hold the room and nothing else."""
-    if room["blend_path"] is None:
+    if blend_path is None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         for thing in room["objects"]:
             _add_room_object(thing, arrays)
         for light in room["lights"]:
             _add_light(light)
     else:
-        _open_blend(Path(room["blend_path"]))
+        _open_blend(Path(blend_path))
     if bpy.context.scene.world is None:
         _add_sky()
     for thing in bpy.context.scene.objects:

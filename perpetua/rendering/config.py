@@ -21,9 +21,15 @@ class RenderConfig(Section):
     max_bounces: int = Field(6, ge=0, le=64, description="light bounces")
     view_transform: str = Field("AgX", description="Blender view transform of the pictures: AgX, Filmic or Standard")
     look: str = Field("AgX - Medium High Contrast", description="Blender look of the view transform, or None")
+    white_balance: float = Field(
+        0.7, ge=0.0, le=1.0, description="share of the lamps' colour cast that the camera takes out; 0: none"
+    )
     jpeg_quality: int = Field(95, ge=1, le=100, description="JPEG quality")
+    bake: bool = Field(
+        True, description="bake a room's procedural materials to images where that saves time; false: never"
+    )
     max_texels: int = Field(
-        4_000_000, ge=0, description="texels baked from a room's procedural materials; 0 keeps flat colours"
+        4_000_000, ge=10_000, le=100_000_000, description="most texels baked from a room's procedural materials"
     )
     frame_timeout_s: float = Field(1800.0, ge=5.0, description="longest time without progress, seconds")
     max_restarts: int = Field(3, ge=0, le=100, description="restarts of Blender after a crash or a hang")

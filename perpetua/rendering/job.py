@@ -56,7 +56,8 @@ def write_job(
     if _stored_digest(path) != digest:
         shutil.rmtree(folder / FRAME_FOLDER, ignore_errors=True)
         (folder / EXPOSURE_FILE).unlink(missing_ok=True)
-    job |= {"digest": digest, "device": device, "threads": config.threads}
+    blend_path = None if room.blend_path is None else str(room.blend_path.resolve())
+    job |= {"digest": digest, "blend_path": blend_path, "device": device, "threads": config.threads}
     write_json(path, job)
     return path
 
@@ -114,10 +115,8 @@ def _stored_digest(path: Path) -> str | None:
 
 def _room_settings(room: Room, writer: _ArrayWriter) -> Settings:
     if room.blend_path is not None:
-        path = room.blend_path.resolve()
-        return {"blend_path": str(path), "blend_sha256": file_sha256(path)}
+        return {"blend_sha256": file_sha256(room.blend_path)}
     return {
-        "blend_path": None,
         "objects": [_object_settings(thing, writer) for thing in room.objects],
         "lights": [_light_settings(light) for light in room.lights],
     }

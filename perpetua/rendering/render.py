@@ -2,11 +2,13 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from perpetua.actors.types import ActorMesh
 from perpetua.cameras.types import CameraPath
 from perpetua.errors import RenderError
+from perpetua.rendering.bake import bake_room
 from perpetua.rendering.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.frames import assemble_view, drop_damaged
@@ -55,6 +57,8 @@ def render_views(
     """
     frame_count = _check_job(room, actors, cameras, device)
     work_dir.mkdir(parents=True, exist_ok=True)
+    if room.blend_path is not None:
+        room = replace(room, blend_path=bake_room(room, config, frame_count * len(cameras), work_dir))
     job_path = write_job(work_dir, room, actors, cameras, config, device)
     _render_pending(job_path, cameras, frame_count, config, on_frame, script)
     frames = work_dir / FRAME_FOLDER
@@ -136,7 +140,10 @@ class _Listener:
                 if event["warning"] is not None:
                     logger.warning("%s", event["warning"])
             case "ready":
-                logger.info("exposure: %+.2f stops", event["exposure_ev"])
+                red, green, blue = event["gains"]
+                logger.info(
+                    "exposure %+.2f stops, white balance %.2f %.2f %.2f", event["exposure_ev"], red, green, blue
+                )
             case "frame":
                 self._done += 1
                 self._on_frame(self._done, self._frame_count, float(event["seconds"]))

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""UV atlases for baking: charts of faces that look the same way, projected flat and packed without overlap.
+
+Every chart keeps its metres, so texels are equally dense everywhere and stretched by 1.7 at most (a face that looks
+along a diagonal of the axes). Arrays in, arrays out: nothing here knows Blender.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Free texels around each chart: baking extends the colours into them, so that filtering never meets a neighbour.
+BORDER_PX = 1
+# A chart is cut in two while it fills less of its box than this, unless the box is small.
+MIN_FILL, MIN_SPLIT_M2, MAX_SPLITS = 0.35, 0.01, 8
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Polygons: ``corner_m`` f64[L, 3], ``face_of_corner`` i64[L], ``edge_of_corner`` i64[L], ``normal`` f64[F, 3]."""
+
+    corner_m: np.ndarray
+    face_of_corner: np.ndarray
+    edge_of_corner: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True)
+class Charts:
+    """``plane_m`` f64[L, 2] corners in their chart, from 0; ``chart`` i64[L], -1: none; ``size_m`` f64[C, 2]."""
+
+    plane_m: np.ndarray
+    chart: np.ndarray
+    size_m: np.ndarray
+
+
+@dataclass(frozen=True)
+class Packing:
+    """Image size in pixels and ``corner_px`` f64[C, 2], where each chart begins."""
+
+    width_px: int
+    height_px: int
+    corner_px: np.ndarray
+
+
+def make_charts(faces: Faces, wanted: np.ndarray) -> Charts:
+    """Charts of the ``wanted`` bool[F] faces: connected ones that look along the same axis and direction."""
+    axis = np.abs(faces.normal).argmax(axis=1)
+    direction = 2 * axis + (np.take_along_axis(faces.normal, axis[:, None], 1)[:, 0] > 0)
+    label = connected_components(len(axis), *_joined_faces(faces, np.where(wanted, direction, -1)))
+    chart_of_face = np.full(len(axis), -1)
+    chart_of_face[wanted] = np.unique(label[wanted], return_inverse=True)[1]
+    plane = np.array([[1, 2], [0, 2], [0, 1]])[axis][faces.face_of_corner]
+    plane_m = np.take_along_axis(faces.corner_m, plane, axis=1)
+    for _ in range(MAX_SPLITS):
+        split = _split_sparse(chart_of_face, plane_m, faces.face_of_corner)
+        if np.array_equal(split, chart_of_face):
+            break
+        chart_of_face = split
+    chart = chart_of_face[faces.face_of_corner]
+    chosen = chart >= 0
+    low_m, high_m = _bounds(plane_m[chosen], chart[chosen])
+    plane_m[chosen] -= low_m[chart[chosen]]
+    size_m = high_m - low_m
+    _lay_flat(plane_m, chart, size_m)
+    return Charts(plane_m, chart, size_m)
+
+
+def _bounds(points: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest coordinates f64[G, 2] of the points in each group."""
+    count = int(group.max()) + 1 if len(group) else 0
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, group, points)
+    np.maximum.at(high, group, points)
+    return low, high
+
+
+def _split_sparse(chart_of_face: np.ndarray, plane_m: np.ndarray, face_of_corner: np.ndarray) -> np.ndarray:
+    """Cuts charts that fill little of their box (a ring of skirting) in two, across the longer side."""
+    wanted = np.flatnonzero(chart_of_face >= 0)
+    if len(wanted) == 0:
+        return chart_of_face
+    chart = chart_of_face[wanted]
+    area_m2 = np.bincount(chart, _plane_area_m2(plane_m, face_of_corner, len(chart_of_face))[wanted])
+    chosen = chart_of_face[face_of_corner] >= 0
+    low_m, high_m = _bounds(plane_m[chosen], chart_of_face[face_of_corner[chosen]])
+    size_m = high_m - low_m
+    sparse = (area_m2 < MIN_FILL * size_m.prod(axis=1)) & (size_m.prod(axis=1) > MIN_SPLIT_M2)
+    corners = np.bincount(face_of_corner, minlength=len(chart_of_face))
+    centre_m = np.stack([np.bincount(face_of_corner, plane_m[:, k]) / corners for k in (0, 1)], axis=1)[wanted]
+    longer = size_m.argmax(axis=1)[chart]
+    along_m = np.take_along_axis(centre_m, longer[:, None], 1)[:, 0]
+    mean_m = np.bincount(chart, along_m) / np.bincount(chart)
+    upper = sparse[chart] & (along_m > mean_m[chart])
+    split = chart_of_face.copy()
+    split[wanted] = np.unique(2 * chart + upper, return_inverse=True)[1]
+    return split
+
+
+def _plane_area_m2(plane_m: np.ndarray, face_of_corner: np.ndarray, count: int) -> np.ndarray:
+    """Area f64[F] of each polygon in its plane, by the shoelace formula."""
+    start = np.searchsorted(face_of_corner, np.arange(count))
+    following = np.arange(1, len(face_of_corner) + 1)
+    last = np.append(start[1:], len(face_of_corner)) - 1
+    following[last] = start
+    cross = plane_m[:, 0] * plane_m[following, 1] - plane_m[:, 1] * plane_m[following, 0]
+    return np.abs(np.bincount(face_of_corner, cross, minlength=count)) / 2.0
+
+
+def _lay_flat(plane_m: np.ndarray, chart: np.ndarray, size_m: np.ndarray) -> None:
+    """Turns tall charts on their side, which packs better."""
+    tall = size_m[:, 1] > size_m[:, 0]
+    size_m[tall] = size_m[tall][:, ::-1]
+    turned = (chart >= 0) & np.append(tall, False)[chart]
+    plane_m[turned] = plane_m[turned][:, ::-1]
+
+
+def _joined_faces(faces: Faces, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of faces that share an edge and look the same way."""
+    order = np.argsort(faces.edge_of_corner, kind="stable")
+    edge, face = faces.edge_of_corner[order], faces.face_of_corner[order]
+    first, second = face[:-1], face[1:]
+    joined = (edge[:-1] == edge[1:]) & (direction[first] == direction[second]) & (direction[first] >= 0)
+    return first[joined], second[joined]
+
+
+def connected_components(count: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """For each of ``count`` nodes the smallest node that edges ``first[k] - second[k]`` connect it to."""
+    label = np.arange(count)
+    while True:
+        least = np.minimum(label[first], label[second])
+        lower = label.copy()
+        np.minimum.at(lower, label[first], least)
+        np.minimum.at(lower, label[second], least)
+        lower = lower[lower]
+        if np.array_equal(lower, label):
+            return label
+        label = lower
+
+
+def pack(charts: Charts, texels_per_m: float) -> Packing:
+    """Places the charts in rows (tallest first) of a nearly square image."""
+    size_px = _size_px(charts, texels_per_m)
+    width_px = max(int(size_px[:, 0].max()), round(float(np.sqrt(size_px.prod(axis=1).sum()))))
+    corner_px = np.zeros((len(size_px), 2))
+    x = y = row_height = 0
+    for chart in np.argsort(-size_px[:, 1], kind="stable"):
+        width, height = size_px[chart]
+        if x + width > width_px:
+            x, y = 0, y + row_height
+        if x == 0:
+            row_height = height
+        corner_px[chart] = (x, y)
+        x += width
+    return Packing(width_px, int(y + row_height), corner_px)
+
+
+def _size_px(charts: Charts, texels_per_m: float) -> np.ndarray:
+    return np.ceil(charts.size_m * texels_per_m).astype(np.int64) + 2 * BORDER_PX
+
+
+def texels(charts: Charts, texels_per_m: float) -> int:
+    """Texels that charts take at a density, before what packing wastes."""
+    return int(_size_px(charts, texels_per_m).prod(axis=1).sum())
+
+
+def shared_density(all_charts: list[Charts], boosts: list[float], budget: int) -> float:
+    """Texels per metre at which all charts together fit a budget, each mesh's density times its boost."""
+    low, high = 1e-2, 1e4
+    for _ in range(40):
+        middle = (low * high) ** 0.5
+        used = sum(texels(charts, middle * boost) for charts, boost in zip(all_charts, boosts, strict=True))
+        low, high = (middle, high) if used <= budget else (low, middle)
+    return low
+
+
+def uv(charts: Charts, packing: Packing, texels_per_m: float) -> np.ndarray:
+    """UV f32[L, 2] of every corner; corners without a chart lie outside the image."""
+    size_px = np.array([packing.width_px, packing.height_px])
+    begin_px = np.append(packing.corner_px, [[0.0, 0.0]], axis=0)[charts.chart]
+    inside = (begin_px + BORDER_PX + charts.plane_m * texels_per_m) / size_px
+    return np.where(charts.chart[:, None] >= 0, inside, -2.0).astype(np.float32)
