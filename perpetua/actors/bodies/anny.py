@@ -80,8 +80,7 @@ def _flesh(wearer: Wearer, person: Person, dressed: Dressed, rng: np.random.Gene
     mouth = (corners[..., 0].min(axis=1) > _MOUTH_UV[0]) & (corners[..., 1].max(axis=1) < _MOUTH_UV[1])
     shown = ~np.all(dressed.hidden[body.faces], axis=1) & ~mouth
     uv = np.concatenate([corners[shown][:, [0, 1, 2]], corners[shown][:, [0, 2, 3]]]).astype(np.float32)
-    places, _ = texel_places_m()
-    scalp = np.clip(scalp_field_m(places.astype(np.float64), person.hair.line_shift_m) / 0.012, 0.0, 1.0)
+    scalp = np.clip(scalp_field_m(texel_places_m(), person.hair.line_shift_m) / 0.012, 0.0, 1.0).astype(np.float32)
     image = paint_skin(person.complexion, scalp, rng)
     skin_material = Material("skin", person.complexion.skin, roughness=0.55, image=image)
     eye_material = Material("eyes", (0.7, 0.7, 0.7), roughness=0.15, image=paint_eye(person.complexion, rng))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32
+from jaxtyping import Bool, Float, Float32, Float64, Int32
 from scipy.spatial import cKDTree
 
 from perpetua.actors.bodies.makehuman import base_mesh
@@ -19,7 +19,8 @@ from perpetua.rooms.types import Material
 
 _BODY_VERTICES = 13380
 _ROWS = 6
-_LONG_M = 0.12
+_LIE = np.array([0.0, 0.0, -0.15])
+_FALL = np.array([0.0, 0.0, -1.0])
 _CROWN_M = np.array([0.035, 0.0, 0.848])
 # Height of the hairline on the base mesh, from the nape forward: over the ear, down the temple, across the forehead.
 _LINE_X_M = (-0.02, 0.005, 0.022, 0.036, 0.058, 0.070, 0.082, 0.100, 0.125, 0.150)
@@ -60,7 +61,7 @@ STYLES = {
 }
 
 
-def scalp_field_m(template_m: Float64[np.ndarray, "*shape 3"], shift_m: float) -> Float64[np.ndarray, "*shape"]:
+def scalp_field_m(template_m: Float[np.ndarray, "*shape 3"], shift_m: float) -> Float64[np.ndarray, "*shape"]:
     """Metres above the hairline on the base mesh; ears and everything below the head are far outside."""
     x, side, z = template_m[..., 0], np.abs(template_m[..., 1]), template_m[..., 2]
     line = np.interp(x, _LINE_X_M, _LINE_Z_M) + shift_m
@@ -147,13 +148,17 @@ def _combed(
     direction = (1.0 - aside) * away + aside * sideways
     direction -= np.sum(direction * normal, axis=1, keepdims=True) * normal
     direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-6)
-    return np.asarray(direction + 0.18 * rng.standard_normal(direction.shape))
+    return np.asarray(direction + 0.12 * rng.standard_normal(direction.shape))
 
 
 def _settle(
     place: Float64[np.ndarray, "L 3"], skull: _Skull, clearance_m: Float64[np.ndarray, " L"], style: HairStyle
-) -> tuple[Float64[np.ndarray, "L 3"], Float64[np.ndarray, "L 3"]]:
-    """Lays points on the skull at their clearance, keeps them off the face, and lets them hang clear elsewhere."""
+) -> tuple[Float64[np.ndarray, "L 3"], Float64[np.ndarray, "L 3"], Bool[np.ndarray, " L"]]:
+    """Lays points on the skull at their clearance, keeps them off the face, and lets them hang clear elsewhere.
+
+    Returns:
+        The points, the directions of the skin nearest to them, and which of them lie on the scalp.
+    """
     _, near = skull.tree.query(place)
     template_m = skull.template_m[near]
     face = (template_m[:, 0] > 0.07) & (template_m[:, 2] < 0.775) & (template_m[:, 2] > 0.58)
@@ -163,7 +168,7 @@ def _settle(
     gap = np.sum((place - skull.places_m[near]) * skull.normals[near], axis=1)
     on_scalp = scalp_field_m(skull.template_m[near], style.line_shift_m) > -0.012
     lift = np.where(on_scalp, clearance_m - gap, np.maximum(clearance_m - gap, 0.0))
-    return place + lift[:, None] * skull.normals[near], skull.normals[near]
+    return place + lift[:, None] * skull.normals[near], skull.normals[near], on_scalp
 
 
 def _grow(
@@ -180,15 +185,16 @@ def _grow(
     skull = _skull(wearer)
     clearance_m = style.cap_m * rng.uniform(0.6, 1.15, len(length)) + 0.003
     wave = rng.uniform(0.0, 2.0 * np.pi, len(length))
-    spine, normals = [root_m - 0.004 * normal], [normal]
+    spine, normals, held = [root_m - 0.004 * normal], [normal], np.ones(len(length), dtype=bool)
     for row in range(1, _ROWS):
-        heading = heading + np.array([0.0, 0.0, -0.8 if style.length_m > _LONG_M else -0.1])
+        # On the scalp locks keep their direction; beyond it they fall.
+        heading = np.where(held[:, None], heading + _LIE, 0.35 * heading + _FALL)
         heading -= 0.9 * np.minimum(np.sum(heading * normals[-1], axis=1, keepdims=True), 0.0) * normals[-1]
         heading /= np.linalg.norm(heading, axis=1, keepdims=True)
         place = spine[-1] + heading * (length / (_ROWS - 1))[:, None]
         place += style.curl_m * np.sin(1.9 * row + wave)[:, None] * np.cross(heading, normals[-1])
         rise_m = clearance_m + style.lift * length * (row / (_ROWS - 1)) ** 1.5
-        place, outward = _settle(place, skull, rise_m, style)
+        place, outward, held = _settle(place, skull, rise_m, style)
         heading = place - spine[-1]
         heading /= np.maximum(np.linalg.norm(heading, axis=1, keepdims=True), 1e-6)
         spine.append(place)

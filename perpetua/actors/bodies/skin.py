@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, UInt8
+from jaxtyping import Float32, Float64, UInt8
 from scipy import ndimage
 
 from perpetua.actors.bodies.makehuman import base_mesh
@@ -12,6 +12,8 @@ from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb
 
 SKIN_PX = 1024
 EYE_PX = 128
+# Rows from and to, and columns from, which the head takes up in the skin image.
+_HEAD_PX = (170, 890, 640)
 _EYE_M = np.array([0.125, 0.031, 0.729])
 _IRIS_SHARE = 0.50
 
@@ -29,8 +31,8 @@ class Complexion:
 
 
 @lru_cache(maxsize=1)
-def texel_places_m() -> tuple[Float32[np.ndarray, "S S 3"], Bool[np.ndarray, "S S"]]:
-    """Where on the base mesh each texel of the skin lies, and which texels lie on it (others: the nearest)."""
+def texel_places_m() -> Float32[np.ndarray, "S S 3"]:
+    """Where on the base mesh each texel of the skin lies; those outside it are given their nearest neighbour's."""
     mesh = base_mesh()
     body = mesh.groups["body"]
     corner_px = np.stack([mesh.uv[:, 0], 1.0 - mesh.uv[:, 1]], axis=1)[body.uv_faces] * SKIN_PX
@@ -49,7 +51,7 @@ def texel_places_m() -> tuple[Float32[np.ndarray, "S S 3"], Bool[np.ndarray, "S 
         places[row.ravel(), column.ravel()] = place.reshape(-1, 3)
         known[row.ravel(), column.ravel()] = True
     nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
-    return places[tuple(nearest)], known
+    return np.asarray(places[tuple(nearest)])
 
 
 def _blob(places: np.ndarray, centre: tuple[float, float, float], radius: tuple[float, float, float]) -> np.ndarray:
@@ -82,30 +84,39 @@ def _beard(places: np.ndarray) -> np.ndarray:
     return np.asarray(np.maximum(jaw * front * mouth * cheeks, lip))
 
 
-def paint_skin(
-    look: Complexion, scalp: Float64[np.ndarray, "S S"], rng: np.random.Generator
-) -> UInt8[np.ndarray, "S S 3"]:
-    """The skin image of one person for the base mesh's UVs; ``scalp`` is how much hair shades each texel, 0 to 1."""
-    places, _ = texel_places_m()
-    places = places.astype(np.float64)
-    tone = np.array(look.skin)
-    mottle = 1.0 + 0.035 * tileable_noise(rng, SKIN_PX, 12, 4) + 0.02 * tileable_noise(rng, SKIN_PX, 120, 2)
-    colour = tone * mottle[..., None]
+def _noise(rng: np.random.Generator, cells: int, octaves: int) -> Float64[np.ndarray, "S S"]:
+    """Noise over the skin image, made at half its size."""
+    return np.asarray(np.kron(tileable_noise(rng, SKIN_PX // 2, cells, octaves), np.ones((2, 2))))
+
+
+def _face_colour(places: np.ndarray, colour: np.ndarray, look: Complexion, strands: np.ndarray) -> np.ndarray:
+    """The head's texels with flushed cheeks, nose and ears, darker lids, lips, brows and beard."""
     flush = 0.55 * _blob(places, (0.13, 0.045, 0.69), (0.04, 0.025, 0.02))
     flush += 0.5 * _blob(places, (0.175, 0.0, 0.70), (0.02, 0.014, 0.012))
     flush += 0.4 * _blob(places, (0.045, 0.087, 0.72), (0.03, 0.012, 0.04))
-    flush = np.clip(flush, 0.0, 1.0)[..., None]
-    colour = colour * (1.0 - flush * np.array([0.02, 0.16, 0.16]))
+    colour = colour * (1.0 - np.clip(flush, 0.0, 1.0)[..., None] * np.array([0.02, 0.16, 0.16]))
     shade = 0.22 * _blob(places, (0.125, 0.031, 0.722), (0.03, 0.022, 0.012))
     colour = colour * (1.0 - shade[..., None] * np.array([0.6, 1.0, 0.9]))
     lips = np.clip(1.6 * _blob(places, (0.155, 0.0, 0.6575), (0.03, 0.024, 0.0075)) - 0.45, 0.0, 1.0)[..., None]
     colour = colour * (1.0 - 0.8 * lips * (1.0 - np.array([0.80, 0.48, 0.50])))
-    freckles = np.clip(tileable_noise(rng, SKIN_PX, 90, 2) - 2.5, 0.0, 1.0)[..., None]
-    colour = colour * (1.0 - 0.35 * freckles)
-    strands = 0.8 + 0.25 * tileable_noise(rng, SKIN_PX, 150, 2)
     cover = np.clip(_brows(places, look.brow_m) * strands, 0.0, 0.95)
-    cover = np.maximum(cover, np.clip(look.beard * _beard(places) * strands, 0.0, 0.9))
-    cover = np.maximum(cover, np.clip(scalp, 0.0, 1.0) * 0.92)[..., None]
+    cover = np.maximum(cover, np.clip(look.beard * _beard(places) * strands, 0.0, 0.9))[..., None]
+    return np.asarray(colour * (1.0 - cover) + np.array(look.hair) * cover)
+
+
+def paint_skin(
+    look: Complexion, scalp: Float32[np.ndarray, "S S"], rng: np.random.Generator
+) -> UInt8[np.ndarray, "S S 3"]:
+    """The skin image of one person for the base mesh's UVs; ``scalp`` is how much hair shades each texel, 0 to 1."""
+    mottle = 1.0 + 0.035 * _noise(rng, 12, 4) + 0.02 * _noise(rng, 120, 2)
+    freckles = np.clip(_noise(rng, 90, 2) - 2.5, 0.0, 1.0)
+    strands = 0.8 + 0.25 * tileable_noise(rng, SKIN_PX, 150, 2)
+    colour = np.array(look.skin) * (mottle * (1.0 - 0.35 * freckles))[..., None]
+    # The head is one block of the image.
+    head = np.s_[_HEAD_PX[0] : _HEAD_PX[1], _HEAD_PX[2] :]
+    places = texel_places_m()[head].astype(np.float64)
+    colour[head] = _face_colour(places, colour[head], look, strands[head])
+    cover = (0.92 * np.clip(scalp * (0.75 + 0.3 * strands), 0.0, 1.0))[..., None]
     return to_srgb(colour * (1.0 - cover) + np.array(look.hair) * cover)
 
 

@@ -69,7 +69,7 @@ _BOTTOMS: dict[str, TrouserPattern | SkirtPattern] = {
     "slim trousers": TrouserPattern(0.130, 0.785, 0.007, 0.011, 0.003),
     "loose trousers": TrouserPattern(0.130, 0.800, 0.011, 0.026, 0.003),
     "shorts": TrouserPattern(0.125, 0.375, 0.011, 0.026, 0.003),
-    "skirt": SkirtPattern(0.140, -0.380, 0.004, 0.003),
+    "skirt": SkirtPattern(0.090, -0.380, 0.003, 0.003),
 }
 _BOTTOM_FABRICS: dict[str, tuple[str, ...]] = {
     "jeans": ("denim",),
@@ -121,7 +121,9 @@ def _pick(options: tuple[str, ...], rng: np.random.Generator) -> str:
 def _draw_shoes(kind: str, rng: np.random.Generator) -> ShoePattern:
     if kind == "leather shoes":
         upper = DYES[_pick(("brown", "charcoal"), rng)]
-        return ShoePattern("leather", 0.016, 2.4, 0.075, upper, tuple(0.8 * c for c in upper), DYES["charcoal"])
+        return ShoePattern(
+            "leather", 0.016, 2.4, 0.075, upper, (0.8 * upper[0], 0.8 * upper[1], 0.8 * upper[2]), DYES["charcoal"]
+        )
     upper, accent = DYES[_pick(("white", "navy", "grey", "charcoal", "red"), rng)], DYES[_pick(_TOP_DYES, rng)]
     sole = DYES["white"] if kind == "trainers" else DYES[_pick(("white", "grey"), rng)]
     return ShoePattern("runner" if kind == "runners" else "canvas", 0.024, 2.2, 0.080, upper, accent, sole)

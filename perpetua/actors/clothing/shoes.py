@@ -205,7 +205,11 @@ def make_shoes(wearer: Wearer, pattern: ShoePattern, rng: np.random.Generator) -
         "shoe upper", pattern.upper, roughness=0.45 if pattern.kind == "leather" else 0.7, image=upper_image
     )
     rubber = Material("shoe sole", pattern.sole, roughness=0.8, image=sole_image)
-    vertices, weights, parts, heels, toes = [], [], [], [], []
+    vertices: list[np.ndarray] = []
+    weights: list[np.ndarray] = []
+    parts: list[ActorPart] = []
+    heels: list[np.ndarray] = []
+    toes: list[np.ndarray] = []
     offset, floor_z_m = 0, 0.0
     for side in ("left", "right"):
         last = _measure(wearer, side, pattern)

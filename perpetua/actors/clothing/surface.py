@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int, Int32
+from jaxtyping import Float64, Int, Int32
 from scipy import sparse
 
 from perpetua.actors.clothing.piece import Surface
@@ -68,10 +68,15 @@ def vertex_normals(
     return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12))
 
 
+def _directed(faces: Int32[np.ndarray, "F 3"]) -> Int32[np.ndarray, "E 2"]:
+    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
 def border_edges(faces: Int32[np.ndarray, "F 3"]) -> Int32[np.ndarray, "E 2"]:
     """Directed edges with a face on one side only, in the order of the faces."""
-    directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, index, count = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)
+    directed = _directed(faces)
+    low, high = directed.min(axis=1).astype(np.int64), directed.max(axis=1).astype(np.int64)
+    _, index, count = np.unique(low * (high.max(initial=0) + 1) + high, return_inverse=True, return_counts=True)
     return directed[count[index.ravel()] == 1]
 
 
@@ -80,18 +85,14 @@ def averaging(faces: Int32[np.ndarray, "F 3"], count: int) -> sparse.csr_matrix:
     border = border_edges(faces)
     on_border = np.zeros(count, dtype=bool)
     on_border[border.ravel()] = True
-    directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    directed = directed[~on_border[directed[:, 0]]]
-    pairs = np.unique(np.concatenate([directed, _inner_reverse(faces, on_border), border, border[:, ::-1]]), axis=0)
+    directed = _directed(faces)
+    both = np.concatenate([directed, directed[:, ::-1]])
+    pairs = np.concatenate([both[~on_border[both[:, 0]]], border, border[:, ::-1]])
     matrix = sparse.csr_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (count, count))
+    matrix.data[:] = 1.0
     degree = np.asarray(matrix.sum(axis=1)).ravel()
     alone = degree == 0
     return (sparse.diags(1.0 / np.maximum(degree, 1.0)) @ matrix + sparse.diags(alone.astype(float))).tocsr()
-
-
-def _inner_reverse(faces: Int32[np.ndarray, "F 3"], on_border: Bool[np.ndarray, " P"]) -> Int32[np.ndarray, "E 2"]:
-    directed = np.concatenate([faces[:, [1, 0]], faces[:, [2, 1]], faces[:, [0, 2]]])
-    return directed[~on_border[directed[:, 0]]]
 
 
 def compact(surface: Surface) -> tuple[Surface, Int32[np.ndarray, " P"]]:

@@ -30,7 +30,7 @@ _ARM_RADIUS_M = 0.055
 _LEG_RADIUS_M = 0.085
 _SKIRT_RADIUS_M = 0.19
 # What a top covers by more than this is left out of trousers: it cannot show, and must not poke through.
-_TUCKED_M = 0.045
+_TUCKED_M = 0.025
 
 
 def _material(name: str, fabric: Fabric) -> Material:
