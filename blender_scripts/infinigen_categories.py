@@ -56,6 +56,13 @@ _PATTERNS = tuple(
         (r"vase\w*", "vase"),
         (r"bowl\w*", "bowl"),
         (r"cup\w*", "cup"),
+        (r"book_(stack|row)", "books"),
+        (r"storage_box", "box"),
+        (r"jar", "jar"),
+        (r"bottle", "bottle"),
+        (r"candle", "candle"),
+        (r"picture_frame", "picture_frame"),
+        (r"towels", "towels"),
     )
 )
 

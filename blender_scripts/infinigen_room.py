@@ -17,9 +17,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 import procfunc
-from infinigen2.objects import boulder, bowl, plant_pot, vase
+from infinigen2.objects import boulder, random_primitives
 from infinigen2.scenes import room as infinigen_rooms
 from infinigen_categories import GLAZED, LAMPS, WALKABLE, category_of
+from infinigen_small_things import small_thing_maker
 from mathutils import Matrix, Vector
 from opaque_materials import cut_panes, make_opaque
 from plain_meshes import (
@@ -60,16 +61,10 @@ def main() -> None:
 
 def _generate(kind: str, seed: int, dimensions_m: list[float]) -> infinigen_rooms.RoomResult:
     procfunc.ops.object.clear_scene()
-    # Infinigen's own rocks need an add-on that can only be had online.
-    boulder.rock_rand = _small_thing
+    # Infinigen's rocks need an add-on that can only be had online, and its other small things are abstract solids.
+    boulder.rock_rand = random_primitives.primitive_with_effect_rand = small_thing_maker(kind)
     make_room = getattr(infinigen_rooms, f"room_{kind}_rand")
     return make_room(np.random.default_rng(seed), dimensions=procfunc.Vector(dimensions_m))
-
-
-def _small_thing(rng: np.random.Generator, *_: object) -> object:
-    """Something to stand on a shelf in a rock's stead."""
-    makers = (bowl.bowl_rand, vase.cup_rand, vase.vase_rand, plant_pot.plant_pot_small_rand)
-    return makers[int(rng.integers(len(makers)))](rng)
 
 
 def _keep_only(result: infinigen_rooms.RoomResult) -> list[bpy.types.Object]:
