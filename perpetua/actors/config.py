@@ -5,14 +5,33 @@ from pydantic import Field
 from perpetua.config_base import Section
 
 
+class RouteWeights(Section):
+    """How much each loss of the route optimisation counts; 0 switches it off."""
+
+    clearance: float = Field(400.0, ge=0.0, description="keeping off obstacles")
+    separation: float = Field(400.0, ge=0.0, description="actors keeping apart")
+    speed: float = Field(50.0, ge=0.0, description="staying under the limit of speed")
+    acceleration: float = Field(5.0, ge=0.0, description="staying under the limit of acceleration")
+    jerk: float = Field(0.002, ge=0.0, description="changing acceleration slowly")
+    heading: float = Field(20.0, ge=0.0, description="facing where one walks")
+    turning: float = Field(20.0, ge=0.0, description="staying under the limit of the turn rate")
+    turn_change: float = Field(0.01, ge=0.0, description="changing the turn rate slowly")
+    variation: float = Field(1.0, ge=0.0, description="not coming back to where one has been")
+    walk: float = Field(2.0, ge=0.0, description="staying near the random walk")
+
+
 class RoutesConfig(Section):
     """How actors move through the room, and the hard limits they keep."""
 
     walk_speed_mps: float = Field(1.1, gt=0.0, le=4.0, description="typical speed while walking, m/s")
     max_speed_mps: float = Field(2.0, gt=0.0, le=6.0, description="hard limit of speed, m/s")
     max_acceleration_mps2: float = Field(4.0, gt=0.0, le=20.0, description="hard limit of acceleration, m/s^2")
+    max_turn_rate_radps: float = Field(2.6, gt=0.2, le=10.0, description="hard limit of the turn rate, rad/s")
     separation_m: float = Field(0.6, ge=0.2, le=3.0, description="least distance between two body axes, metres")
+    stop_share: float = Field(0.25, ge=0.0, le=1.0, description="share of places walked to at which an actor stops")
+    learning_rate: float = Field(0.02, gt=0.0, le=1.0, description="Adam's first step size, metres and radians")
     steps: int = Field(400, ge=10, le=10000, description="Adam steps")
+    weights: RouteWeights = Field(default_factory=RouteWeights)
     max_redraws: int = Field(20, ge=0, le=500, description="new walks tried when a route breaks a limit")
 
 
