@@ -41,7 +41,7 @@ def hanging_arm(
     shoulder = about_y(-forward_rad) @ about_x(0.92 * drop_rad) @ about_y(np.full(count, _HANGING_TWIST_RAD))
     bend_rad = np.clip(elbow_rad + 0.4 * np.maximum(forward_rad, -0.2), 0.08, 1.2)
     elbow = about_z(-bend_rad) @ about_y(np.full(count, _PRONATION_RAD))
-    wrist = about_z(np.full(count, -0.12)) @ about_x(np.full(count, -0.05)) @ about_y(np.full(count, _PRONATION_RAD))
+    wrist = about_z(np.full(count, -0.12)) @ about_x(np.full(count, -0.16)) @ about_y(np.full(count, _PRONATION_RAD))
     if side == "right":
         collar, shoulder, elbow, wrist = (_mirrored(part) for part in (collar, shoulder, elbow, wrist))
     world_from_collar = world_from_chest @ collar

@@ -20,8 +20,12 @@ _FARTHEST_ASIDE_M = 0.15
 _FOOT_LENGTH_M = 0.27
 # When in its stance a foot has the body over its ankle: before half, as the second half is spent rolling over the ball.
 _BODY_OVER_ANKLE = 0.41
-# A foot lands at most this far from under the body, in heights of the hip: a person who stops takes a shorter step.
-_FARTHEST_LANDING = 0.47
+# A foot lands at most this far from under the body, in heights of the hip: a person who starts or stops takes shorter
+# steps, so it is so much at rest and so much more per m/s.
+_LANDING_AT_REST, _LANDING_PER_MPS = 0.3, 0.1
+# A foot lifts before the body has gone this far from over it, in heights of the hip.
+_FARTHEST_BEHIND = 0.57
+_LEAST_DOUBLE_SUPPORT_S = 0.06
 _PACE_WINDOW_S = 0.8
 
 
@@ -103,7 +107,7 @@ class FootstepPlanner:
             done[side].append(Plant(old.position_m, old.yaw_rad, old.land_s, time_s, old.dodge_m))
             standing[side] = self._step(side, old, standing[1 - side], time_s, timing)
             turn = 1 - side
-            time_s += max(0.5 * timing.cycle_s, timing.swing_s + 0.06)
+            time_s = self._next_lift_s(standing[turn], time_s, timing)
         return (*done[LEFT], standing[LEFT]), (*done[RIGHT], standing[RIGHT])
 
     def _timing(self, time_s: float) -> StepTiming:
@@ -120,6 +124,15 @@ class FootstepPlanner:
         if self._need(standing[1 - turn], 1 - turn, land_s) >= 1.0:
             return 1 - turn
         return None
+
+    def _next_lift_s(self, plant: Plant, lift_s: float, timing: StepTiming) -> float:
+        """When the standing foot lifts: half a cycle after the other, sooner where the body would leave it behind."""
+        earliest_s = lift_s + timing.swing_s + _LEAST_DOUBLE_SUPPORT_S
+        latest_s = max(lift_s + 0.5 * timing.cycle_s, earliest_s)
+        moments_s = np.linspace(earliest_s, latest_s, 8)
+        away_m = np.linalg.norm(self._path.position_m(moments_s)[:, :2] - plant.position_m[:2], axis=1)
+        left_behind = away_m > _FARTHEST_BEHIND * self._hip_height_m
+        return float(moments_s[left_behind.argmax()]) if left_behind.any() else latest_s
 
     def _opening_side(self, time_s: float, otherwise: int) -> int:
         """The foot that a standing person turns with first: the one on the inside of the turn."""
@@ -149,7 +162,7 @@ class FootstepPlanner:
     def _step(self, side: int, old: Plant, other: Plant, lift_s: float, timing: StepTiming) -> Plant:
         land_s = lift_s + timing.swing_s
         ideal = self._ideal(side, land_s + _BODY_OVER_ANKLE * timing.support_s)
-        position_m = self._within_reach(ideal.position_m, self._ideal(side, land_s).position_m)
+        position_m = self._within_reach(ideal.position_m, self._ideal(side, land_s).position_m, land_s)
         position_m[:2] += np.clip(self._rng.normal(0.0, 0.007, 2), -0.015, 0.015)
         yaw_rad = ideal.yaw_rad + float(np.clip(self._rng.normal(0.0, 0.02), -0.05, 0.05))
         outward = 1.0 if side == LEFT else -1.0
@@ -161,10 +174,11 @@ class FootstepPlanner:
         return Plant(position_m, yaw_rad, land_s, np.inf, dodge_m)
 
     def _within_reach(
-        self, wanted_m: Float64[np.ndarray, "3"], under_body_m: Float64[np.ndarray, "3"]
+        self, wanted_m: Float64[np.ndarray, "3"], under_body_m: Float64[np.ndarray, "3"], land_s: float
     ) -> Float64[np.ndarray, "3"]:
         ahead_m = wanted_m - under_body_m
-        farthest_m = _FARTHEST_LANDING * self._hip_height_m
+        speed_mps = float(self._path.speed_mps(np.array([land_s]))[0])
+        farthest_m = (_LANDING_AT_REST + _LANDING_PER_MPS * speed_mps) * self._hip_height_m
         return under_body_m + ahead_m * min(1.0, farthest_m / max(float(np.linalg.norm(ahead_m)), 1e-9))
 
 
