@@ -12,6 +12,7 @@ from perpetua.geometry.pinhole import unproject
 from perpetua.geometry.raycast import Caster
 from perpetua.geometry.transforms import transform_points
 from perpetua.rendering.types import RenderedView
+from perpetua.tracks.sides import connected_surfaces
 from perpetua.tracks.surface import SceneMeshes, SurfacePoints, join_points, plane_barycentric
 
 SAMPLED_IMAGES = 64
@@ -120,21 +121,22 @@ class ActorSurfaces:
 
 
 def _seen_areas_m2(actor: ActorMesh) -> Float64[np.ndarray, " F"]:
-    """Area of each face, 0 where another part covers it.
+    """Area of each face, 0 where something covers it.
 
-    A face is covered when another part lies close over its middle at each of a few times, as a shirt lies over skin.
-    Rendered depth alone cannot tell skin from cloth a few millimetres above it.
+    A face is covered when another connected surface of the actor lies close over its middle at each of a few times,
+    as a shirt lies over skin and a lock of hair over another. Rendered depth alone cannot tell skin from cloth a few
+    millimetres above it.
     """
-    part = np.repeat(np.arange(len(actor.parts)), [len(part.faces) for part in actor.parts])
+    surface = connected_surfaces(actor.vertices_m[0], actor.faces)
     frames = len(actor.vertices_m)
-    covered = np.ones(len(part), bool)
+    covered = np.ones(len(surface), bool)
     for frame in sorted({frames // 2, frames - 1}):
         mesh = TriMesh(actor.vertices_m[frame].astype(np.float64), actor.faces)
         corner_m = mesh.vertices_m[mesh.faces]
         normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         hits = Caster(mesh).first_hit(corner_m.mean(axis=1) + COVER_GAP_M * normal, normal)
-        covered &= (hits.distance_m < COVER_M) & (part[hits.face] != part)
+        covered &= (hits.distance_m < COVER_M) & (surface[hits.face] != surface)
     return np.where(covered, 0.0, face_areas_m2(actor.vertices_m[frames // 2], actor.faces))
 
 

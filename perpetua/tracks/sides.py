@@ -72,6 +72,13 @@ def closed_sides(vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray
     return ClosedSides(closed[surface], np.stack([low_m, high_m], axis=1)[surface])
 
 
+def connected_surfaces(
+    vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray, "F 3"]
+) -> Int64[np.ndarray, " F"]:
+    """Numbers the connected surfaces of a mesh: a body, a shirt, each lock of hair."""
+    return _surface_of_faces(_vertex_at_one_position(vertices_m)[faces])
+
+
 def _vertex_at_one_position(vertices_m: Float[np.ndarray, "P 3"]) -> Int64[np.ndarray, " P"]:
     """Numbers vertices so that those at one position share a number.
 
