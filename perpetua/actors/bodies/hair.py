@@ -19,6 +19,7 @@ from perpetua.rooms.types import Material
 
 _BODY_VERTICES = 13380
 _ROWS = 6
+_LONG_M = 0.12
 _LIE = np.array([0.0, 0.0, -0.15])
 _FALL = np.array([0.0, 0.0, -1.0])
 _CROWN_M = np.array([0.035, 0.0, 0.848])
@@ -161,7 +162,8 @@ def _settle(
     """
     _, near = skull.tree.query(place)
     template_m = skull.template_m[near]
-    face = (template_m[:, 0] > 0.07) & (template_m[:, 2] < 0.775) & (template_m[:, 2] > 0.58)
+    curtain = style.length_m > _LONG_M
+    face = curtain & (template_m[:, 0] > 0.07) & (template_m[:, 2] < 0.775) & (template_m[:, 2] > 0.58)
     aside = np.where(face, np.maximum(0.080 - np.abs(template_m[:, 1]), 0.0), 0.0)
     place = place + (np.sign(place[:, 1]) * aside)[:, None] * np.array([0.0, 1.0, 0.0])
     _, near = skull.tree.query(place)

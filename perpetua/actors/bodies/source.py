@@ -1,6 +1,6 @@
 """What a body model is."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float32
@@ -11,6 +11,7 @@ from perpetua.registry import Registry
 from perpetua.seeding import StageSeed
 
 
+@runtime_checkable
 class Body(Protocol):
     """One dressed person: a shape, garments, hair and shoes, ready to be posed."""
 
@@ -34,6 +35,7 @@ class Body(Protocol):
         ...
 
 
+@runtime_checkable
 class BodyModel(Protocol):
     """Draws bodies; the same arguments give the same body, bit for bit."""
 

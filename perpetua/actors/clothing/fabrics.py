@@ -91,7 +91,7 @@ def _denim(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> np.
     column, row = _grid()
     twill = 0.5 + 0.5 * np.sin(2.0 * np.pi * 64 * (column + row))
     yarn = rng.normal(0.0, 0.045, SIZE_PX)[None, :] + 0.05 * tileable_noise(rng, SIZE_PX, 60, 2)
-    fade = 0.035 * tileable_noise(rng, SIZE_PX, 3, 3)
+    fade = 0.018 * tileable_noise(rng, SIZE_PX, 3, 3)
     share = np.clip(0.08 + 0.20 * twill + yarn + fade, 0.0, 1.0)
     return _mix(base, np.full(3, 0.62), share)
 
