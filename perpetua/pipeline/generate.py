@@ -49,6 +49,7 @@ def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> i
     Raises:
         InputError: the request cannot be carried out as it stands.
     """
+    say = _speaker(console)
     until = _checked_stage(request.until)
     require_libraries()
     cost = estimate_cost(request.config, len(request.rooms))
@@ -64,7 +65,7 @@ def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> i
         with Progress(request.out / LOG_FILE, len(request.rooms), request.config.cameras.count, console) as progress:
             failures = run_rooms(request.rooms, request.workers, job, progress.show)
     except KeyboardInterrupt:
-        console.print(f"stopped; what is done is kept. To go on, run the same command again:\n  {_this_command()}")
+        say(f"stopped; what is done is kept. To go on, run the same command again:\n  {_this_command()}")
         return EXIT_INTERRUPTED
     _say_result(request, failures, until, console)
     return 1 if failures else 0
@@ -91,7 +92,7 @@ def _checked_stage(until: str | None) -> str:
 
 
 def _say_cost(request: GenerateRequest, cost: Cost, free_bytes: float, until: str, console: Console) -> None:
-    say: Callable[[str], None] = partial(console.print, highlight=False, soft_wrap=True)
+    say = _speaker(console)
     render = request.config.render
     say(f"{cost.rooms} room(s) of seed {request.seed}, first {request.rooms.start}, through stage '{until}'")
     say(
@@ -109,7 +110,7 @@ def _say_cost(request: GenerateRequest, cost: Cost, free_bytes: float, until: st
 
 
 def _say_result(request: GenerateRequest, failures: dict[int, str], until: str, console: Console) -> None:
-    say: Callable[[str], None] = partial(console.print, highlight=False, soft_wrap=True)
+    say = _speaker(console)
     for room in request.rooms:
         layout = OutputLayout(request.out, request.config.export.split, request.seed, room)
         if room in failures:
@@ -120,6 +121,11 @@ def _say_result(request: GenerateRequest, failures: dict[int, str], until: str, 
             say(f"room {room}: done through '{until}' in {layout.work_folder}")
     if failures:
         say(f"{len(failures)} of {len(request.rooms)} rooms failed; to try them again:\n  {_this_command()}")
+
+
+def _speaker(console: Console) -> Callable[[str], None]:
+    """Prints a text as it is: no markup in it, no colours guessed, long lines left to the terminal."""
+    return partial(console.print, highlight=False, markup=False, soft_wrap=True)
 
 
 def _this_command() -> str:

@@ -10,6 +10,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from perpetua.pipeline.events import Event
 
@@ -52,7 +53,7 @@ class Progress(AbstractContextManager["Progress"]):
         self._log.flush()
         if event.kind == "frame_rendered" and not self._estimated and event.seconds > 0:
             self._estimated = True
-            self._console.print(self._estimate(event), highlight=False)
+            self._console.print(self._estimate(event), highlight=False, markup=False)
         if self._live is None:
             self._print_line(event)
         else:
@@ -72,18 +73,18 @@ class Progress(AbstractContextManager["Progress"]):
             if not last and time.monotonic() - self._last_frame_line < 10:
                 return
             self._last_frame_line = time.monotonic()
-        self._console.print(describe(event), highlight=False, soft_wrap=True)
+        self._console.print(describe(event), highlight=False, markup=False, soft_wrap=True)
 
     def _update_table(self, live: Live, event: Event) -> None:
         if event.kind in ("message", "room_failed", "stage_finished", "room_finished"):
-            live.console.print(describe(event), highlight=False)
+            live.console.print(describe(event), highlight=False, markup=False)
         if event.kind in ("room_finished", "room_failed"):
             self._lines.pop(event.room, None)
         elif event.kind != "message":
             self._lines[event.room] = event
         table = Table.grid(padding=(0, 2))
         for room in sorted(self._lines):
-            table.add_row(describe(self._lines[room]))
+            table.add_row(Text(describe(self._lines[room])))
         live.update(table)
 
 
