@@ -117,7 +117,8 @@ def _actor_distance_m(swept: _Sweep, actor: ActorMesh) -> float:
         if box_m[step] >= nearest_m:
             break
         frame, share = swept.frame[step], swept.share[step]
-        vertices_m = (1.0 - share) * actor.vertices_m[frame] + share * actor.vertices_m[frame + 1]
+        start_m, end_m = actor.vertices_m[frame : frame + 2].astype(np.float64)
+        vertices_m = (1.0 - share) * start_m + share * end_m
         nearest_m = min(nearest_m, _mesh_distance_m(swept.position_m[step], vertices_m, faces))
     return nearest_m
 

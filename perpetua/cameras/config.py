@@ -18,7 +18,7 @@ class CameraWeights(Section):
     actor_clearance: float = Field(60.0, ge=0.0, description="weight of the distance to actors")
     framing: float = Field(40.0, ge=0.0, description="weight of the focus lying inside the image")
     size: float = Field(3.0, ge=0.0, description="weight of the focus having the wished height in the image")
-    coverage: float = Field(20.0, ge=0.0, description="weight of every actor being seen by two views")
+    coverage: float = Field(60.0, ge=0.0, description="weight of every actor being seen by two views")
     occlusion: float = Field(30.0, ge=0.0, description="weight of a clear line of sight past furniture")
     crowding: float = Field(4.0, ge=0.0, description="weight of a clear line of sight past other actors")
     smoothness: float = Field(0.3, ge=0.0, description="weight of small acceleration of position")

@@ -77,10 +77,10 @@ def size(
 
 
 def coverage(
-    chest_camera_m: Float[Tensor, "S C T A 3"], tan_half_fov: Float[Tensor, "S C 2"], views: int, margin: float
+    point_camera_m: Float[Tensor, "S C T A L 3"], tan_half_fov: Float[Tensor, "S C 2"], views: int, margin: float
 ) -> Float[Tensor, " S"]:
-    """How far each actor's chest lies outside the images of the ``views`` views that come nearest to showing it."""
-    outside = _outside(chest_camera_m, tan_half_fov[:, :, None, None], margin)
+    """How far each actor's points lie outside the images of the ``views`` views that come nearest to showing them."""
+    outside = _outside(point_camera_m, tan_half_fov[:, :, None, None, None], margin).mean(-1)
     return outside.topk(views, dim=1, largest=False).values.mean((1, 2, 3))
 
 

@@ -19,6 +19,7 @@ CONTROL_S = 0.6
 LEARNING_RATE_M = 0.02
 MARGIN = 0.15
 COVERING_VIEWS = 2
+COVERED_POINTS = 2
 LINE_SAMPLES = 20
 LINE_POINTS = 2
 LINE_WANTED_M = 0.12
@@ -163,13 +164,14 @@ class _Terms:
         ).unsqueeze(-2)
         line_distance_m = losses.field_distance(self.grid, self.origin_m, self.voxel_m, line_m)
         least, most = self.size_range.unbind(-1)
+        views = position_m.shape[1]
         return {
             "framing": losses.framing(in_camera_m, self.tan_half_fov, self.point_weight, MARGIN),
             "size": losses.size(
                 distance_m, self.top_m - self.bottom_m, self.tan_half_fov, least, most, self.focus_weight
             ),
             "coverage": losses.coverage(
-                in_camera_m[..., 1, :], self.tan_half_fov, min(COVERING_VIEWS, position_m.shape[1]), MARGIN
+                in_camera_m[..., :COVERED_POINTS, :], self.tan_half_fov, min(COVERING_VIEWS, views), MARGIN
             ),
             "occlusion": losses.occlusion(line_distance_m, LINE_WANTED_M),
             "crowding": losses.crowding(

@@ -9,7 +9,7 @@ from perpetua.errors import CameraError
 from perpetua.geometry.raycast import Caster
 from perpetua.rooms.types import Room
 
-# Distances are exact up to here; further away they are interpolated between exact ones (errors of a few mm).
+# Distances are exact up to here; further away, where clearance does not matter, they are a few mm too long at most.
 NEAR_M = 0.45
 COARSE_STRIDE = 3
 PADDING_VOXELS = 2
@@ -77,16 +77,32 @@ def _centres(
 def _surface_distance_m(
     caster: Caster, origin_m: Float64[np.ndarray, "3"], voxel_m: float, shape: tuple[int, int, int]
 ) -> Float64[np.ndarray, "X Y Z"]:
-    coarse_shape = tuple(-(-(n - 1) // COARSE_STRIDE) + 1 for n in shape)
-    coarse_shape = (coarse_shape[0], coarse_shape[1], coarse_shape[2])
-    coarse_m = caster.closest_distance(_centres(origin_m, COARSE_STRIDE * voxel_m, coarse_shape)).reshape(coarse_shape)
-    steps = [np.arange(n) / COARSE_STRIDE for n in shape]
-    distance_m = ndimage.map_coordinates(coarse_m, np.meshgrid(*steps, indexing="ij"), order=1, mode="nearest")
-    # A distance changes by at most the distance moved, so beyond this band nothing can be nearer than NEAR_M.
+    """Exact below ``NEAR_M``; beyond, the distance to the nearest of the points found from a coarser grid."""
+    distance_m = _coarse_distance_m(caster, origin_m, voxel_m, shape)
+    # Of two distances the larger is at most the smaller and the way between: only these can be below NEAR_M.
     near = distance_m < NEAR_M + np.sqrt(3.0) * COARSE_STRIDE * voxel_m
     exact_m = caster.closest_distance(origin_m + voxel_m * np.argwhere(near), NEAR_M)
     distance_m[near] = np.where(exact_m < NEAR_M, exact_m, np.maximum(distance_m[near], NEAR_M))
-    return np.asarray(distance_m)
+    return distance_m
+
+
+def _coarse_distance_m(
+    caster: Caster, origin_m: Float64[np.ndarray, "3"], voxel_m: float, shape: tuple[int, int, int]
+) -> Float64[np.ndarray, "X Y Z"]:
+    """Least distance to the surface points nearest to the eight surrounding nodes of a grid with a longer step."""
+    nodes = (_nodes(shape[0]), _nodes(shape[1]), _nodes(shape[2]))
+    surface_m = caster.closest_point(_centres(origin_m, COARSE_STRIDE * voxel_m, nodes)).reshape(*nodes, 3)
+    centres_m = _centres(origin_m, voxel_m, shape).reshape(*shape, 3)
+    cell = [np.arange(n) // COARSE_STRIDE for n in shape]
+    distance_m = np.full(shape, np.inf)
+    for corner in np.ndindex(2, 2, 2):
+        node = np.ix_(*(cell[i] + corner[i] for i in range(3)))
+        distance_m = np.minimum(distance_m, np.linalg.norm(surface_m[node] - centres_m, axis=-1))
+    return distance_m
+
+
+def _nodes(voxels: int) -> int:
+    return (voxels - 1) // COARSE_STRIDE + 2
 
 
 def _boundary_distance_m(

@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float64, Int32
 from perpetua.geometry.mesh import TriMesh
 
 NO_FACE = -1
+FAR_M = 1e6
 
 
 @dataclass(frozen=True)
@@ -73,21 +74,27 @@ class Caster:
         return np.asarray(blocker < 0)
 
     def closest_distance(
-        self, points_m: Float64[np.ndarray, "N 3"], max_distance_m: float = 1e6
+        self, points_m: Float64[np.ndarray, "N 3"], max_distance_m: float = FAR_M
     ) -> Float64[np.ndarray, " N"]:
         """Distance of each point to the nearest triangle, or ``max_distance_m`` where none is nearer.
 
         A small ``max_distance_m`` makes the search several times as quick.
         """
+        closest_m = self.closest_point(points_m, max_distance_m)
+        distance_m = np.linalg.norm(closest_m - points_m, axis=1)
+        return np.where(np.isnan(distance_m), max_distance_m, distance_m)
+
+    def closest_point(
+        self, points_m: Float64[np.ndarray, "N 3"], max_distance_m: float = FAR_M
+    ) -> Float64[np.ndarray, "N 3"]:
+        """The point of any triangle that is nearest to each point; NaN where none is within ``max_distance_m``."""
         if len(points_m) == 0 or len(self.mesh.faces) == 0:
-            return np.full(len(points_m), max_distance_m)
+            return np.full(points_m.shape, np.nan)
         warp, kernel = _warp_kernel()
         points = warp.array(_single(points_m), dtype=warp.vec3, device="cpu")
-        distance_m = warp.empty(len(points_m), dtype=float, device="cpu")
-        warp.launch(
-            kernel, len(points_m), [self._warp_mesh.id, points, float(max_distance_m), distance_m], device="cpu"
-        )
-        return np.asarray(distance_m.numpy().astype(np.float64))
+        offset = warp.full(len(points_m), np.nan, dtype=warp.vec3, device="cpu")
+        warp.launch(kernel, len(points_m), [self._warp_mesh.id, points, max_distance_m, offset], device="cpu")
+        return np.asarray(points_m + offset.numpy())
 
     def _plane_distance_m(
         self,
@@ -133,11 +140,12 @@ def _warp_kernel() -> tuple[Any, Any]:
 
     # Warp compiles the function's source; its annotations are Warp's types, not Python's.
     @no_type_check
-    def nearest(mesh: warp.uint64, points: warp.array(dtype=warp.vec3), limit: float, out: warp.array(dtype=float)):
+    def nearest(
+        mesh: warp.uint64, points: warp.array(dtype=warp.vec3), limit: float, offset: warp.array(dtype=warp.vec3)
+    ):
         i = warp.tid()
         query = warp.mesh_query_point_no_sign(mesh, points[i], limit)
-        out[i] = limit
         if query.result:
-            out[i] = warp.length(points[i] - warp.mesh_eval_position(mesh, query.face, query.u, query.v))
+            offset[i] = warp.mesh_eval_position(mesh, query.face, query.u, query.v) - points[i]
 
     return warp, warp.kernel(nearest)

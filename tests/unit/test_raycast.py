@@ -74,11 +74,22 @@ def test_closest_distance_equals_an_exhaustive_search(scene: TriMesh) -> None:
     np.testing.assert_allclose(Caster(scene).closest_distance(points), exact, atol=2e-6)
 
 
+def test_closest_point_lies_on_the_shape_at_the_distance() -> None:
+    ball = _mesh(trimesh.creation.icosphere(4, 1.0))
+    points = _points(50)
+    caster = Caster(ball)
+    closest = caster.closest_point(points)
+    assert np.linalg.norm(closest, axis=1) == pytest.approx(np.ones(50), abs=0.003)
+    np.testing.assert_allclose(np.linalg.norm(closest - points, axis=1), caster.closest_distance(points), atol=1e-9)
+    assert np.isnan(caster.closest_point(np.zeros((1, 3)), 0.5)).all()
+
+
 def test_closest_distance_is_cut_at_the_limit(scene: TriMesh) -> None:
     points = _points(200)
     caster = Caster(scene)
     full, cut = caster.closest_distance(points), caster.closest_distance(points, max_distance_m=0.2)
     assert (full > 0.2).any() and (full < 0.2).any()
+    np.testing.assert_array_equal(cut[full > 0.2001], 0.2)
     np.testing.assert_allclose(cut, np.minimum(full, 0.2), atol=1e-6)
 
 

@@ -1,0 +1,108 @@
+"""A path that keeps every rule passes; each planted fault is found, by its rule and value."""
+
+import numpy as np
+import pytest
+from camera_scene import camera_path, camera_room, walker
+from jaxtyping import Float64
+
+from perpetua.cameras.audit import CameraAudit, audit_paths
+from perpetua.cameras.config import CamerasConfig
+from perpetua.geometry.mesh import join
+from perpetua.geometry.raycast import Caster
+
+FRAMES, FPS = 12, 12.0
+START_M, END_M = np.array([-2.4, 0.5, 1.4]), np.array([-2.4, -0.5, 1.4])
+TARGET_M = np.array([1.5, 0.5, 1.2])
+ROOM = camera_room()
+CASTER = Caster(join([thing.mesh for thing in ROOM.objects]))
+
+
+def _line(start_m: Float64[np.ndarray, "3"], end_m: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "T 3"]:
+    share = np.linspace(0.0, 1.0, FRAMES)[:, None]
+    return np.asarray((1.0 - share) * start_m + share * end_m)
+
+
+def _audit(
+    position_m: Float64[np.ndarray, "T 3"],
+    target_m: Float64[np.ndarray, "3"] = TARGET_M,
+    min_focus_share: float = 0.5,
+) -> CameraAudit:
+    actors = (walker(0, _line(np.array([1.5, 0.5, 0.0]), np.array([1.2, 0.9, 0.0]))[:, :2]),)
+    focus = np.ones((1, FRAMES, 1), bool)
+    config = CamerasConfig(min_focus_share=min_focus_share)
+    return audit_paths((camera_path(position_m, target_m),), focus, ROOM, actors, CASTER, FPS, config)
+
+
+def _only_rule(audit: CameraAudit) -> str:
+    assert len(audit.violations) == 1, audit.violations
+    assert "is required" in audit.violations[0].message
+    return audit.violations[0].rule
+
+
+def test_a_good_path_passes_with_exact_figures() -> None:
+    audit = _audit(_line(START_M, END_M))
+    assert audit.passed and audit.focus_share[0] == 1.0
+    assert audit.scene_distance_m[0] == pytest.approx(0.6, abs=1e-5)
+    assert audit.travel_m[0] == pytest.approx(1.0)
+
+
+def test_a_thin_sheet_crossed_between_two_frames_is_found() -> None:
+    """No frame is closer than 0.17 m to the table top; the way between two frames goes through it."""
+    position_m = _line(np.array([0.0, -0.35, 1.0]), np.array([0.0, -0.3, 1.0]))
+    position_m[6:, 2] = 0.5
+    audit = _audit(position_m)
+    assert "scene" in {violation.rule for violation in audit.violations}
+    assert audit.scene_distance_m[0] < 0.02
+
+
+def test_too_near_the_wall() -> None:
+    beside_wall_m = np.array([-2.9, 0.0, 0.0]) + np.array([0.0, 1.0, 1.0]) * _line(START_M, END_M)
+    audit = _audit(beside_wall_m)
+    assert _only_rule(audit) == "scene"
+    assert audit.violations[0].value == pytest.approx(0.1, abs=1e-5)
+
+
+def test_too_near_an_actor() -> None:
+    """The capsule's surface is 0.2 m from its axis."""
+    axis_m = _line(np.array([1.5, 0.5, 0.0]), np.array([1.2, 0.9, 0.0]))
+    audit = _audit(axis_m + np.array([0.0, 0.45, 1.4]), np.array([1.5, 0.0, 1.4]), min_focus_share=0.0)
+    assert _only_rule(audit) == "actor"
+    # A capsule of ten segments lies up to 1 - cos(18 degrees) of its radius inside the round one.
+    assert 0.25 - 1e-6 <= audit.actor_distance_m[0] < 0.262
+
+
+def test_outside_of_the_room() -> None:
+    """Through the window, where no triangle is near."""
+    audit = _audit(_line(np.array([0.0, 2.9, 1.45]), np.array([0.5, 2.9, 1.45])))
+    assert _only_rule(audit) == "room"
+
+
+def test_looking_away_from_the_focus() -> None:
+    audit = _audit(_line(START_M, END_M), np.array([-3.0, 0.0, 1.2]))
+    assert "focus" in {violation.rule for violation in audit.violations}
+    assert audit.focus_share[0] == 0.0
+
+
+def test_too_fast() -> None:
+    far_m = START_M + 2.0 * (END_M - START_M)
+    audit = _audit(_line(START_M + 1.0 * (START_M - END_M), far_m))
+    assert _only_rule(audit) == "speed"
+    assert audit.violations[0].value == pytest.approx(3.0 / (FRAMES - 1) * FPS)
+
+
+def test_a_jerk() -> None:
+    position_m = _line(START_M, END_M)
+    position_m[5, 2] += 0.04
+    assert _only_rule(_audit(position_m)) == "acceleration"
+
+
+def test_too_steep() -> None:
+    audit = _audit(_line(np.array([1.2, 0.4, 2.3]), np.array([1.6, 0.6, 2.3])))
+    assert "pitch" in {violation.rule for violation in audit.violations}
+
+
+def test_too_quick_a_turn() -> None:
+    """Passing 0.2 m beside the point looked at, at 1.1 m/s."""
+    audit = _audit(_line(START_M, END_M), np.array([-2.2, 0.0, 1.4]), min_focus_share=0.0)
+    assert _only_rule(audit) == "turn"
+    assert audit.violations[0].value > 200.0
