@@ -108,7 +108,7 @@ def relaxed_hands(vertices_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray,
     """The body with its fingers bent a little, as hands that do nothing are; MakeHuman's are stretched."""
     heads = bone_heads(vertices_m)
     moved = vertices_m.copy()
-    for letter, sign in (("L", 1.0), ("R", -1.0)):
+    for letter, sign in (("L", -1.0), ("R", 1.0)):
         across = sign * (heads[f"finger2-1.{letter}"] - heads[f"finger5-1.{letter}"])
         across /= np.linalg.norm(across)
         for finger, bends in _FINGER_BEND_DEG.items():

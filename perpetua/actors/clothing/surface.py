@@ -95,7 +95,7 @@ def averaging(faces: Int32[np.ndarray, "F 3"], count: int) -> sparse.csr_matrix:
     return (sparse.diags(1.0 / np.maximum(degree, 1.0)) @ matrix + sparse.diags(alone.astype(float))).tocsr()
 
 
-def compact(surface: Surface) -> tuple[Surface, Int32[np.ndarray, " P"]]:
+def compact(surface: Surface) -> tuple[Surface, Int32[np.ndarray, " Q"]]:
     """The surface without unused vertices, and the old index of each vertex kept."""
     used, faces = np.unique(surface.faces, return_inverse=True)
     kept = Surface(
@@ -112,7 +112,7 @@ def _blend(values: np.ndarray, edges: np.ndarray, share: np.ndarray) -> np.ndarr
     return np.asarray(first + share[:, None] * (second - first))
 
 
-def split(surface: Surface, field: Float64[np.ndarray, " P"]) -> tuple[Surface, Float64[np.ndarray, " P"]]:
+def split(surface: Surface, field: Float64[np.ndarray, " P"]) -> tuple[Surface, Float64[np.ndarray, " Q"]]:
     """Cuts triangles along the line where a field that is linear in each triangle is zero.
 
     Returns:
@@ -153,7 +153,7 @@ def _cut_triangles(cut: np.ndarray, new: np.ndarray, field: np.ndarray, turn: in
     return np.concatenate([np.stack(corner, axis=1) for corner in corners])
 
 
-def positive(surface: Surface, field: Float64[np.ndarray, " P"]) -> tuple[Surface, Float64[np.ndarray, " P"]]:
+def positive(surface: Surface, field: Float64[np.ndarray, " P"]) -> tuple[Surface, Float64[np.ndarray, " Q"]]:
     """The part of a surface where a field is positive, cut along its zero line, and the field there."""
     grown, values = split(surface, field)
     inside = np.max(values[grown.faces], axis=1) > 0
