@@ -76,7 +76,7 @@ def _bounds(points: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def _split_sparse(chart_of_face: np.ndarray, plane_m: np.ndarray, face_of_corner: np.ndarray) -> np.ndarray:
-    """Cuts charts that fill little of their box (a ring of skirting) in two, across the longer side."""
+    """Cuts charts that fill little of their box (a ring of skirting) in two, where their faces lie furthest apart."""
     wanted = np.flatnonzero(chart_of_face >= 0)
     if len(wanted) == 0:
         return chart_of_face
@@ -88,8 +88,9 @@ def _split_sparse(chart_of_face: np.ndarray, plane_m: np.ndarray, face_of_corner
     sparse = (area_m2 < MIN_FILL * size_m.prod(axis=1)) & (size_m.prod(axis=1) > MIN_SPLIT_M2)
     corners = np.bincount(face_of_corner, minlength=len(chart_of_face))
     centre_m = np.stack([np.bincount(face_of_corner, plane_m[:, k]) / corners for k in (0, 1)], axis=1)[wanted]
-    longer = size_m.argmax(axis=1)[chart]
-    along_m = np.take_along_axis(centre_m, longer[:, None], 1)[:, 0]
+    low_centre_m, high_centre_m = _bounds(centre_m, chart)
+    wider = (high_centre_m - low_centre_m).argmax(axis=1)[chart]
+    along_m = np.take_along_axis(centre_m, wider[:, None], 1)[:, 0]
     mean_m = np.bincount(chart, along_m) / np.bincount(chart)
     upper = sparse[chart] & (along_m > mean_m[chart])
     split = chart_of_face.copy()
@@ -172,6 +173,22 @@ def shared_density(all_charts: list[Charts], boosts: list[float], budget: int) -
         used = sum(texels(charts, middle * boost) for charts, boost in zip(all_charts, boosts, strict=True))
         low, high = (middle, high) if used <= budget else (low, middle)
     return low
+
+
+def blur(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """``values`` f[H, W, K] smoothed with weights 1-2-1 along both sides, over the ``known`` bool[H, W] texels."""
+    weight = known.astype(np.float32)[..., None]
+    total = values * weight
+    for axis in (0, 1):
+        total, weight = _smooth(total, axis), _smooth(weight, axis)
+    return total / np.maximum(weight, 1e-6)
+
+
+def _smooth(values: np.ndarray, axis: int) -> np.ndarray:
+    padding = [(0, 0)] * values.ndim
+    padding[axis] = (1, 1)
+    padded = np.moveaxis(np.pad(values, padding), axis, 0)
+    return np.moveaxis(padded[:-2] + 2.0 * padded[1:-1] + padded[2:], 0, axis)
 
 
 def uv(charts: Charts, packing: Packing, texels_per_m: float) -> np.ndarray:

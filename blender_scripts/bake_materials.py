@@ -123,6 +123,8 @@ class Baker:
             target="IMAGE_TEXTURES",
             uv_layer=BAKED_UV,
         )
+        if normal:
+            soften(image)
         image.pack()
         return image
 
@@ -149,6 +151,22 @@ class Baker:
             return
         for link in list(displacement.links):
             tree.links.remove(link)
+
+
+def soften(image: bpy.types.Image) -> None:
+    """Averages baked normals over neighbouring texels.
+
+    A normal is baked at one point of a texel. Where bumps are finer than texels, that is noise, which would turn a
+    polished floor into sandpaper; rendering the bumps themselves averages over a pixel likewise.
+    """
+    width, height = image.size
+    pixels = np.empty(4 * width * height, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(height, width, 4)
+    baked = (pixels[..., :3] != 0.0).any(axis=-1)
+    pixels[..., :3] = np.where(baked[..., None], atlas.blur(pixels[..., :3], baked), pixels[..., :3])
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
 
 
 def collect() -> list[Work]:

@@ -65,10 +65,12 @@ def _configure_sampling(cycles: bpy.types.bpy_struct, settings: dict) -> None:
     cycles.samples = settings["samples"]
     cycles.use_adaptive_sampling = settings["noise_threshold"] > 0.0
     cycles.adaptive_threshold = settings["noise_threshold"]
-    cycles.adaptive_min_samples = 0
+    # The first samples tell how noisy a pixel is; with fewer, some noise would go unseen.
+    cycles.adaptive_min_samples = max(4, settings["samples"] // 4)
     cycles.use_animated_seed = False
     cycles.time_limit = 0.0
-    cycles.use_light_tree = True
+    # Picking lamps by a tree costs a quarter more here, and looks the same once denoised.
+    cycles.use_light_tree = False
     cycles.use_auto_tile = False
     cycles.max_bounces = bounces
     cycles.diffuse_bounces = bounces

@@ -13,12 +13,12 @@ class RenderConfig(Section):
     samples: int = Field(32, ge=1, le=16384, description="Cycles samples per pixel")
     denoise: bool = Field(True, description="denoise with Open Image Denoise, guided by albedo and normal")
     noise_threshold: float = Field(
-        0.0,
+        0.05,
         ge=0.0,
         le=1.0,
         description="noise at which a pixel gets no more samples, as a share; 0: always all samples",
     )
-    max_bounces: int = Field(6, ge=0, le=64, description="light bounces")
+    max_bounces: int = Field(4, ge=0, le=64, description="light bounces")
     view_transform: str = Field("AgX", description="Blender view transform of the pictures: AgX, Filmic or Standard")
     look: str = Field("AgX - Medium High Contrast", description="Blender look of the view transform, or None")
     white_balance: float = Field(

@@ -1,0 +1,88 @@
+"""Baking: the baked room looks the same, has the same ground truth, and is made once."""
+
+import logging
+import subprocess
+import sys
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jaxtyping import Float64
+from PIL import Image
+
+from perpetua.cameras.types import CameraPath
+from perpetua.geometry.mesh import TriMesh
+from perpetua.geometry.pinhole import Intrinsics
+from perpetua.geometry.transforms import look_at
+from perpetua.rendering import bake
+from perpetua.rendering.config import RenderConfig
+from perpetua.rendering.render import render_views
+from perpetua.rendering.types import RenderedView
+from perpetua.rooms.types import Room, SceneObject
+
+pytestmark = pytest.mark.blender
+
+CONFIG = RenderConfig(width_px=96, height_px=48, samples=48, noise_threshold=0.0, max_texels=60_000)
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory: pytest.TempPathFactory) -> Room:
+    folder = tmp_path_factory.mktemp("room")
+    blend = folder / "room.blend"
+    script = Path(__file__).parent / "make_procedural_room.py"
+    subprocess.run(
+        [sys.executable, str(script), str(blend)],
+        check=True,
+        capture_output=True,
+        env={"BLENDER_USER_RESOURCES": str(folder), "PATH": ""},
+    )
+    # What is rendered comes from the .blend; of the objects only the indices matter here.
+    empty = TriMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
+    boards = tuple(SceneObject(k, f"board_{k}", "board", empty, None, False, True) for k in (1, 2, 3))
+    return Room("boards", "livingroom", np.zeros((4, 2)), 2.5, boards, (), blend)
+
+
+def _camera() -> CameraPath:
+    pose = look_at(np.array([[0.2, -2.6, 3.4]]), np.array([[0.0, 0.0, 0.0]]))
+    return CameraPath(0, pose, Intrinsics.centred(96, 48, 1.5))
+
+
+def _render(room: Room, config: RenderConfig, folder: Path) -> RenderedView:
+    return render_views(room, (), (_camera(),), config, "cpu", folder, lambda *_: None)[0]
+
+
+def _picture(view: RenderedView) -> Float64[np.ndarray, "H W 3"]:
+    return np.asarray(Image.open(BytesIO(view.jpeg[0])), np.float64)
+
+
+def test_a_baked_room_looks_the_same(
+    room: Room, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(bake, "MIN_SAMPLES", 0)
+    monkeypatch.setattr(bake, "MIN_TEXELS", 60_000)
+    with caplog.at_level(logging.INFO):
+        baked = _render(room, CONFIG, tmp_path / "baked")
+    # The two boards that share a mesh share its images; the plain board needs none.
+    assert "materials of 1 meshes" in caplog.text
+    plain = _render(room, CONFIG.model_copy(update={"bake": False}), tmp_path / "plain")
+    np.testing.assert_array_equal(baked.depth_m, plain.depth_m)
+    np.testing.assert_array_equal(baked.object_index, plain.object_index)
+    difference = np.abs(_picture(baked) - _picture(plain))
+    for index in (1, 2, 3):
+        assert difference[plain.object_index[0] == index].mean() < 5.0
+    # The checks are there: an edge of the original is an edge of the baked picture.
+    seen = plain.object_index[0] == 2
+    reds = _picture(plain)[..., 0][seen], _picture(baked)[..., 0][seen]
+    assert np.corrcoef(*reds)[0, 1] > 0.95
+    assert reds[0].std() > 20.0
+
+
+def test_a_room_is_baked_once(room: Room, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bake, "MIN_SAMPLES", 0)
+    first = bake.bake_room(room, CONFIG, 1, tmp_path)
+    changed_ns = first.stat().st_mtime_ns
+    assert bake.bake_room(room, CONFIG, 1, tmp_path) == first
+    assert first.stat().st_mtime_ns == changed_ns
+    other = bake.bake_room(room, CONFIG.model_copy(update={"max_texels": 20_000}), 1, tmp_path)
+    assert other != first

@@ -1,0 +1,133 @@
+"""Texture atlases: charts keep their metres, never overlap, and share a budget."""
+
+import importlib
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from perpetua.rendering.bake import bake_room, texel_budget
+from perpetua.rendering.blender import SCRIPT_FOLDER
+from perpetua.rendering.config import RenderConfig
+from perpetua.rooms.types import Room
+
+
+@pytest.fixture(scope="module")
+def atlas() -> ModuleType:
+    """The module of Blender's scripts; it needs numpy alone."""
+    sys.path.insert(0, str(SCRIPT_FOLDER))
+    try:
+        return importlib.import_module("atlas")
+    finally:
+        sys.path.remove(str(SCRIPT_FOLDER))
+
+
+def _quads(atlas: ModuleType, corners_m: np.ndarray) -> object:
+    """Faces of quads f64[F, 4, 3]; corners at one place are one vertex, so quads that touch share an edge."""
+    flat_m = corners_m.reshape(-1, 3)
+    _, vertex = np.unique(np.round(flat_m, 6), axis=0, return_inverse=True)
+    ends = np.stack([vertex.reshape(-1, 4), np.roll(vertex.reshape(-1, 4), -1, axis=1)], axis=-1).reshape(-1, 2)
+    _, edge = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    normal = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 3] - corners_m[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return atlas.Faces(flat_m, np.repeat(np.arange(len(corners_m)), 4), edge, normal)
+
+
+def _box(size_m: tuple[float, float, float]) -> np.ndarray:
+    """Six quads of a box, outwards."""
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2.0
+    quads = []
+    for axis in range(3):
+        for side in (-0.5, 0.5):
+            quad = np.insert(signs, axis, side, axis=1)
+            outwards = np.cross(quad[1] - quad[0], quad[3] - quad[0])[axis] * side > 0
+            quads.append(quad if outwards else quad[::-1])
+    return np.stack(quads) * np.array(size_m)
+
+
+def test_components_follow_chains_of_any_length(atlas: ModuleType) -> None:
+    count = 200
+    shuffled = np.random.default_rng(3).permutation(count)
+    chain = np.concatenate([shuffled[:120], shuffled[119:120]])
+    label = atlas.connected_components(count, chain[:-1], chain[1:])
+    assert set(label[shuffled[:120]]) == {int(shuffled[:120].min())}
+    np.testing.assert_array_equal(label[shuffled[120:]], shuffled[120:])
+
+
+def test_a_box_has_six_charts_of_its_sides_sizes(atlas: ModuleType) -> None:
+    charts = atlas.make_charts(_quads(atlas, _box((3.0, 2.0, 1.0))), np.ones(6, bool))
+    sizes = sorted(map(tuple, np.round(charts.size_m, 9)))
+    assert sizes == [(2.0, 1.0)] * 2 + [(3.0, 1.0)] * 2 + [(3.0, 2.0)] * 2
+
+
+def test_unwanted_faces_get_no_chart(atlas: ModuleType) -> None:
+    wanted = np.array([True, False, True, False, False, False])
+    charts = atlas.make_charts(_quads(atlas, _box((3.0, 2.0, 1.0))), wanted)
+    np.testing.assert_array_equal(charts.chart.reshape(6, 4)[:, 0] >= 0, wanted)
+    assert len(charts.size_m) == 2
+
+
+def test_a_ring_is_cut_so_that_its_hole_takes_no_texels(atlas: ModuleType) -> None:
+    """Skirting round a room of 6 x 5 m, 2 cm deep, seen from above: 0.44 m2 in a box of 30 m2."""
+    outer, inner = np.array([3.0, 2.5]), np.array([2.98, 2.48])
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    corners = np.concatenate([signs * outer, signs * inner])
+    quads = np.array([[k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k] for k in range(4)])
+    corners_m = np.column_stack([corners, np.zeros(8)])[quads]
+    charts = atlas.make_charts(_quads(atlas, corners_m), np.ones(4, bool))
+    assert charts.size_m.prod(axis=1).sum() < 0.6
+
+
+def test_packed_charts_do_not_overlap_and_keep_their_border(atlas: ModuleType) -> None:
+    rng = np.random.default_rng(5)
+    boxes = [_box(tuple(rng.uniform(0.05, 1.5, 3))) + rng.uniform(-50, 50, 3) for _ in range(25)]
+    charts = atlas.make_charts(_quads(atlas, np.concatenate(boxes)), np.ones(150, bool))
+    density = 40.0
+    packing = atlas.pack(charts, density)
+    uv_px = atlas.uv(charts, packing, density) * [packing.width_px, packing.height_px]
+    taken = np.zeros((packing.height_px, packing.width_px), int)
+    for chart in range(len(charts.size_m)):
+        low, high = uv_px[charts.chart == chart].min(axis=0), uv_px[charts.chart == chart].max(axis=0)
+        np.testing.assert_allclose(high - low, charts.size_m[chart] * density, atol=1e-2)
+        assert (low > atlas.BORDER_PX - 0.01).all()
+        first = np.floor(low + 0.01).astype(int) - atlas.BORDER_PX
+        last = np.ceil(high - 0.01).astype(int) + atlas.BORDER_PX
+        taken[first[1] : last[1], first[0] : last[0]] += 1
+    assert taken.max() == 1
+    assert taken.mean() > 0.7
+
+
+def test_density_uses_the_budget_and_no_more(atlas: ModuleType) -> None:
+    all_charts = [atlas.make_charts(_quads(atlas, _box((k + 1.0, 2.0, 1.0))), np.ones(6, bool)) for k in range(4)]
+    boosts = [1.0, 1.0, 1.5, 1.0]
+    density = atlas.shared_density(all_charts, boosts, 500_000)
+    used = sum(atlas.texels(charts, density * boost) for charts, boost in zip(all_charts, boosts, strict=True))
+    assert 490_000 < used <= 500_000
+
+
+def test_blur_ignores_texels_that_were_not_baked(atlas: ModuleType) -> None:
+    values = np.zeros((6, 8, 1), np.float32)
+    known = np.zeros((6, 8), bool)
+    known[1:5, 2:6] = True
+    values[known] = 7.0
+    np.testing.assert_allclose(atlas.blur(values, known)[known], 7.0, rtol=1e-6)
+    values[2, 3] = 23.0
+    # Weights 1-2-1 in both directions: a quarter of the difference stays in the middle.
+    np.testing.assert_allclose(atlas.blur(values, known)[2, 3], 7.0 + 16.0 / 4.0, rtol=1e-5)
+
+
+def test_the_budget_follows_the_work_ahead() -> None:
+    config = RenderConfig(width_px=192, height_px=192, samples=24, max_texels=4_000_000)
+    assert texel_budget(config, 1) == 0
+    assert texel_budget(config, 8) == 300_000
+    assert 300_000 < texel_budget(config, 96) < 4_000_000
+    assert texel_budget(config, 10_000) == 4_000_000
+    assert texel_budget(config.model_copy(update={"bake": False}), 10_000) == 0
+
+
+def test_a_room_is_rendered_as_made_where_baking_does_not_pay(tmp_path: Path) -> None:
+    blend = tmp_path / "room.blend"
+    room = Room("room", "kitchen", np.zeros((4, 2)), 2.5, (), (), blend)
+    assert bake_room(room, RenderConfig(width_px=64, height_px=48, samples=4), 24, tmp_path) == blend
