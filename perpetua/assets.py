@@ -54,7 +54,7 @@ def load_manifest(folder: Path = MANIFEST_FOLDER) -> list[Asset]:
 def _read_entry(path: Path) -> Asset:
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
-        lists = {key: tuple(content.pop(key, ())) for key in ("files", "sha256")}
-        return Asset(**content, **lists)
+        files, sha256 = (tuple(content.pop(key, ())) for key in ("files", "sha256"))
+        return Asset(**content, files=files, sha256=sha256)
     except (OSError, yaml.YAMLError, TypeError, AttributeError, ValueError) as error:
         raise AssetError(f"asset manifest '{path}' is not valid: {error}") from None

@@ -127,15 +127,25 @@ def verify(folders: tuple[Path, ...], as_json: bool) -> None:
 
 @main.command()
 @click.argument("sequence", type=click.Path(path_type=Path))
-@click.option("--out", "png", type=click.Path(path_type=Path, dir_okay=False), help="PNG to write.")
+@click.option(
+    "--out", "png", type=click.Path(path_type=Path, dir_okay=False), help="PNG to write; default: SEQUENCE.png here."
+)
+@click.option("--plan", "plan_png", type=click.Path(path_type=Path, dir_okay=False), help="Also a plan, to this PNG.")
 @click.option("--times", type=click.IntRange(1, 24), default=6, show_default=True, help="Frames shown.")
-def preview(sequence: Path, png: Path | None, times: int) -> None:
-    """Draw a contact sheet of a sequence: views by times, tracks with fading tails, depth, actors."""
-    from perpetua.audit.contact_sheet import write_contact_sheet
+def preview(sequence: Path, png: Path | None, plan_png: Path | None, times: int) -> None:
+    """Draw a contact sheet of a sequence: views by times, tracks with fading tails, depth, actors.
 
-    target = png if png is not None else sequence / "contact_sheet.png"
+    The plan shows the ways of people and cameras from above.
+    """
+    from perpetua.audit.contact_sheet import write_contact_sheet
+    from perpetua.audit.plan_view import write_plan_view
+
+    target = png if png is not None else Path(f"{sequence.absolute().name}.png")
     write_contact_sheet(sequence, target, times)
     click.echo(f"wrote {target}")
+    if plan_png is not None:
+        write_plan_view(sequence, plan_png)
+        click.echo(f"wrote {plan_png}")
 
 
 @main.command()
@@ -162,7 +172,10 @@ def doctor(out: Path) -> None:
     for finding in findings:
         table.add_row(finding.subject, finding.state, finding.value, finding.remedy)
     Console().print(table)
-    sys.exit(1 if any(finding.state == "missing" for finding in findings) else 0)
+    missing = [finding for finding in findings if finding.state == "missing"]
+    for finding in missing:
+        click.echo(f"{finding.subject} is missing: {finding.remedy}")
+    sys.exit(1 if missing else 0)
 
 
 @main.command()

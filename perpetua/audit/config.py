@@ -32,5 +32,7 @@ class AuditConfig(Section):
     moving_m: float = Field(
         0.05, gt=0.0, description="a track moves when two of its positions are so far apart, metres"
     )
-    min_moving_share: float = Field(0.25, ge=0.0, le=1.0, description="least share of tracks that move")
-    max_moving_share: float = Field(0.35, ge=0.0, le=1.0, description="largest share of tracks that move")
+    moving_share: float = Field(
+        0.3, ge=0.0, le=1.0, description="share of tracks that move, where the sequence does not record the wanted one"
+    )
+    moving_share_slack: float = Field(0.05, ge=0.0, le=1.0, description="largest difference of that share")

@@ -59,12 +59,20 @@ def check_query_draw(files: SequenceFiles) -> Check:
 
 
 def check_moving_share(files: SequenceFiles, bounds: AuditConfig) -> Check:
-    """The share of tracks with two positions more than ``moving_m`` apart."""
+    """The share of tracks with two positions more than ``moving_m`` apart is about the one that was asked for."""
     share = float(moves_more_than(files.arrays["tracks_xyz.npy"], bounds.moving_m).mean())
-    passed = bounds.min_moving_share <= share <= bounds.max_moving_share
-    bound = f"{bounds.min_moving_share:g} to {bounds.max_moving_share:g}"
+    wanted = _recorded_moving_share(files, bounds.moving_share)
+    passed = abs(share - wanted) <= bounds.moving_share_slack
+    bound = f"{wanted:g} within {bounds.moving_share_slack:g}"
     detail = "" if passed else f"tracks_xyz.npy: {share:.1%} of tracks move more than {bounds.moving_m:g} m"
     return Check("moving tracks", passed, share, bound, detail)
+
+
+def _recorded_moving_share(files: SequenceFiles, otherwise: float) -> float:
+    try:
+        return float((files.record or {})["config"]["tracks"]["dynamic_share"])
+    except (KeyError, TypeError, ValueError):
+        return otherwise
 
 
 def track_table(files: SequenceFiles) -> tuple[dict[str, np.ndarray], str]:

@@ -78,7 +78,7 @@ def _run_in_processes(rooms: Sequence[int], workers: int, job: RoomJob, on_event
     manager.start(_ignore_interrupts)
     with manager:
         events: Queue[Event | None] = manager.Queue()
-        reporter = Thread(target=_drain, args=(events, on_event), daemon=True)
+        reporter = Thread(target=_drain, args=(events.get, on_event), daemon=True)
         reporter.start()
         pool = ProcessPoolExecutor(min(workers, len(rooms)), mp_context=context, initializer=_start_worker)
         try:
@@ -115,6 +115,6 @@ def _stop(pool: ProcessPoolExecutor) -> None:
         process.terminate()
 
 
-def _drain(events: "Queue[Event | None]", on_event: OnEvent) -> None:
-    while (event := events.get()) is not None:
+def _drain(next_event: Callable[[], Event | None], on_event: OnEvent) -> None:
+    while (event := next_event()) is not None:
         on_event(event)

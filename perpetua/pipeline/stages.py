@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 from perpetua.actors.assembly import assemble_actors, draw_bodies
 from perpetua.actors.bodies.source import Body
+from perpetua.actors.config import ActorsConfig
 from perpetua.actors.motion.plan import make_motions
 from perpetua.actors.routes import plan_routes
 from perpetua.actors.types import ActorMesh, BodyMotion, Route
@@ -118,8 +120,13 @@ def _routes(context: StageContext) -> tuple[Route, ...]:
 
 
 def _bodies(context: StageContext) -> tuple[Body, ...]:
-    """Motion and actors draw the same bodies, so both draw them from one stream of its own."""
-    return draw_bodies(context.config.actors, StageSeed(context.seed.seed, context.seed.room, "bodies"))
+    return _draw_bodies_once(context.config.actors.model_dump_json(), context.seed.seed, context.seed.room)
+
+
+@lru_cache(maxsize=1)
+def _draw_bodies_once(actors_json: str, seed: int, room: int) -> tuple[Body, ...]:
+    """Motion and actors need the same bodies: both draw from one stream of its own, and one of them pays."""
+    return draw_bodies(ActorsConfig.model_validate_json(actors_json), StageSeed(seed, room, "bodies"))
 
 
 def _motion(context: StageContext) -> tuple[BodyMotion, ...]:
