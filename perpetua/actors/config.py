@@ -15,8 +15,8 @@ class RouteWeights(Section):
     jerk: float = Field(0.002, ge=0.0, description="changing acceleration slowly")
     heading: float = Field(20.0, ge=0.0, description="facing where one walks")
     turning: float = Field(20.0, ge=0.0, description="staying under the limit of the turn rate")
-    turn_change: float = Field(0.01, ge=0.0, description="changing the turn rate slowly")
-    variation: float = Field(1.0, ge=0.0, description="not coming back to where one has been")
+    turn_change: float = Field(0.05, ge=0.0, description="changing the turn rate slowly")
+    variation: float = Field(0.4, ge=0.0, description="not coming back to where one has been")
     walk: float = Field(2.0, ge=0.0, description="staying near the random walk")
 
 
@@ -51,10 +51,14 @@ class ValidationConfig(Section):
     max_slide_mps: float = Field(
         0.04, gt=0.0, le=1.0, description="highest 95th percentile of the speed of a sole while it stands, m/s"
     )
-    max_sole_penetration_m: float = Field(0.015, gt=0.0, le=0.2, description="deepest sole in the floor, metres")
-    max_floating_m: float = Field(0.02, gt=0.0, le=0.2, description="highest sole above the floor it stands on, metres")
-    max_scene_depth_m: float = Field(0.05, gt=0.0, le=1.0, description="deepest body in furniture or walls, metres")
-    min_actor_distance_m: float = Field(0.02, ge=0.0, le=1.0, description="least distance between two actors, metres")
+    max_sole_penetration_m: float = Field(
+        0.035, gt=0.0, le=0.2, description="deepest sole in the floor or in the edge of a rug, metres"
+    )
+    max_floating_m: float = Field(
+        0.035, gt=0.0, le=0.2, description="highest sole above the floor it stands on, metres"
+    )
+    max_scene_depth_m: float = Field(0.08, gt=0.0, le=1.0, description="deepest body in furniture or walls, metres")
+    max_actor_overlap_m: float = Field(0.03, ge=0.0, le=1.0, description="deepest actor in another, metres")
     max_path_error_m: float = Field(0.15, gt=0.0, le=1.0, description="farthest pelvis from its route, metres")
     step_m: float = Field(
         0.1, ge=0.0, le=0.3, description="what stands no higher than this on the floor is stepped over, metres"

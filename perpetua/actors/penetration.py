@@ -61,33 +61,77 @@ def sampled_vertices(actor: ActorMesh, count: int) -> Int64[np.ndarray, " K"]:
     return np.unique(np.linspace(0, vertices - 1, min(count, vertices)).astype(np.int64))
 
 
+@dataclass(frozen=True)
+class Probe:
+    """Vertices of an actor that are checked, and for each the bone it belongs to and where along it (0 to 1)."""
+
+    vertices: Int64[np.ndarray, " P"]
+    bone_of: Int64[np.ndarray, " P"]
+    share_of: Float64[np.ndarray, " P"]
+
+    def skin_m(self, actor: ActorMesh, frames: Int64[np.ndarray, " K"]) -> Float64[np.ndarray, "K P 3"]:
+        """Places of the vertices."""
+        return actor.vertices_m[np.ix_(frames, self.vertices)].astype(np.float64)
+
+    def anchors_m(
+        self, joint_m: Float64[np.ndarray, "T 22 3"], frames: Int64[np.ndarray, " K"]
+    ) -> Float64[np.ndarray, "K P 3"]:
+        """Places on the bones."""
+        start_m, end_m = _bone_ends_m(joint_m, frames)
+        return start_m[:, self.bone_of] + self.share_of[None, :, None] * (end_m - start_m)[:, self.bone_of]
+
+
+def make_probe(
+    actor: ActorMesh, joint_m: Float64[np.ndarray, "T 22 3"], frames: Int64[np.ndarray, " K"], count: int
+) -> Probe:
+    """About ``count`` vertices of an actor with the bone that each keeps closest to; ``joint_m`` is for all frames."""
+    vertices = sampled_vertices(actor, count)
+    few = frames[np.unique(np.linspace(0, len(frames) - 1, 8).astype(np.int64))]
+    bone_of, share_of = _closest_bones(actor.vertices_m[np.ix_(few, vertices)].astype(np.float64), joint_m[few])
+    return Probe(vertices, bone_of, share_of)
+
+
 def scene_depth(
     actor: ActorMesh,
     joint_m: Float64[np.ndarray, "T 22 3"],
+    probe: Probe,
     obstacles: Obstacles,
     frames: Int64[np.ndarray, " K"],
-    count: int,
 ) -> Worst:
-    """The deepest of about ``count`` vertices in an obstacle, over ``frames``; ``joint_m`` is for all frames."""
-    vertices_m = actor.vertices_m[np.ix_(frames, sampled_vertices(actor, count))].astype(np.float64)
-    few = np.unique(np.linspace(0, len(frames) - 1, 8).astype(np.int64))
-    bone_of, share_of = _anchors(vertices_m[few], joint_m[frames[few]])
-    parents, joints = np.array(_BONES).T
-    start_m, end_m = joint_m[np.ix_(frames, parents)], joint_m[np.ix_(frames, joints)]
-    anchor_m = start_m[:, bone_of] + share_of[None, :, None] * (end_m - start_m)[:, bone_of]
-    skin = _crossings(obstacles.caster, anchor_m, vertices_m)
+    """The deepest of an actor's vertices in an obstacle, over ``frames``; ``joint_m`` is for all frames."""
+    vertices_m = probe.skin_m(actor, frames)
+    start_m, end_m = _bone_ends_m(joint_m, frames)
+    skin = _crossings(obstacles.caster, probe.anchors_m(joint_m, frames), vertices_m)
     bones = _crossings(obstacles.caster, start_m, end_m)
     depth_m = [_behind_m(skin, vertices_m[skin.row, skin.column])]
     face, row = [skin.face], [skin.row]
     for crossing in range(len(bones.row)):
         # All that hangs on the far end of the bone is on the wrong side too, though no surface parts it from its bone.
-        hanging = np.isin(bone_of, _bones_from(int(bones.column[crossing])))
+        hanging = np.isin(probe.bone_of, _bones_from(int(bones.column[crossing])))
         one = bones.only(crossing)
         beyond_m = np.concatenate([vertices_m[one.row[0], hanging], end_m[one.row, one.column]])
         depth_m.append(_behind_m(one, beyond_m).max(keepdims=True))
         face.append(one.face)
         row.append(one.row)
     return _deepest(np.concatenate(depth_m), np.concatenate(face), frames[np.concatenate(row)], obstacles)
+
+
+def overlap_m(
+    actor: ActorMesh, joint_m: Float64[np.ndarray, "T 22 3"], probe: Probe, other: ActorMesh, frame: int
+) -> float:
+    """How deep an actor's vertices are in another actor at a frame; 0 where they are not."""
+    frames = np.array([frame])
+    skin_m = probe.skin_m(actor, frames)
+    surface = Caster(TriMesh(other.vertices_m[frame].astype(np.float64), other.faces))
+    crossings = _crossings(surface, probe.anchors_m(joint_m, frames), skin_m)
+    return float(_behind_m(crossings, skin_m[crossings.row, crossings.column]).max(initial=0.0))
+
+
+def _bone_ends_m(
+    joint_m: Float64[np.ndarray, "T 22 3"], frames: Int64[np.ndarray, " K"]
+) -> tuple[Float64[np.ndarray, "K B 3"], Float64[np.ndarray, "K B 3"]]:
+    parents, joints = np.array(_BONES).T
+    return joint_m[np.ix_(frames, parents)], joint_m[np.ix_(frames, joints)]
 
 
 def _deepest(
@@ -103,7 +147,7 @@ def _deepest(
     return Worst(float(depth_m[deepest]), int(frame[deepest]), f"'{thing}'")
 
 
-def _anchors(
+def _closest_bones(
     vertices_m: Float64[np.ndarray, "K P 3"], joint_m: Float64[np.ndarray, "K 22 3"]
 ) -> tuple[Int64[np.ndarray, " P"], Float64[np.ndarray, " P"]]:
     """For each vertex the bone that it keeps closest to over some frames, and where along it (0 to 1)."""

@@ -10,7 +10,16 @@ from scipy.spatial import cKDTree
 
 from perpetua.actors.config import ValidationConfig
 from perpetua.actors.motion.kinematics import CONTACT_JOINTS, contact_positions, joint_index, joint_positions
-from perpetua.actors.penetration import Obstacles, Worst, make_floor, make_obstacles, sampled_vertices, scene_depth
+from perpetua.actors.penetration import (
+    Obstacles,
+    Probe,
+    Worst,
+    make_floor,
+    make_obstacles,
+    make_probe,
+    overlap_m,
+    scene_depth,
+)
 from perpetua.actors.types import CONTACTS, ActorMesh, BodyMotion, Route, Skeleton
 from perpetua.errors import ActorError
 from perpetua.geometry.raycast import Caster
@@ -18,6 +27,8 @@ from perpetua.rooms.types import Room
 
 # A vertex of the sole lies this near to a contact point, in the plane of the sole and above it, in the rest pose.
 _SOLE_RADIUS_M, _SOLE_THICKNESS_M = 0.06, 0.025
+# Bodies whose checked vertices come this near are tested for overlap.
+_TOUCH_M = 0.06
 # Floor is looked for from this far above the route.
 _FLOOR_SEARCH_M = 0.3
 
@@ -37,7 +48,7 @@ class ActorFigures:
 
 @dataclass(frozen=True)
 class PairFigures:
-    """Least distance of two actors at each checked frame."""
+    """Least distance of two actors at each checked frame; negative is how deep they are in each other."""
 
     actors: tuple[int, int]
     frames: Int64[np.ndarray, " K"]
@@ -68,6 +79,18 @@ class ActorReport:
         }
 
 
+@dataclass(frozen=True)
+class _Person:
+    """One actor with all that it is measured against, and the vertices that are checked."""
+
+    actor: ActorMesh
+    motion: BodyMotion
+    skeleton: Skeleton
+    route: Route
+    joint_m: Float64[np.ndarray, "T 22 3"]
+    probe: Probe
+
+
 def validate_actors(
     actors: tuple[ActorMesh, ...],
     motions: tuple[BodyMotion, ...],
@@ -94,13 +117,13 @@ def validate_actors(
     frames = np.unique(np.linspace(0, len(routes[0].heading_rad) - 1, config.frames).astype(np.int64))
     low_m = float(min(route.position_m[:, 2].min() for route in routes)) + config.step_m
     obstacles, floor = make_obstacles(room, low_m), make_floor(room)
-    people = list(zip(actors, motions, skeletons, routes, strict=True))
+    people = [
+        _person(actor, motion, skeleton, route, frames, config.vertices)
+        for actor, motion, skeleton, route in zip(actors, motions, skeletons, routes, strict=True)
+    ]
     report = ActorReport(
-        tuple(
-            _figures(actor, motion, skeleton, route, obstacles, floor, frames, fps, config)
-            for actor, motion, skeleton, route in people
-        ),
-        tuple(_pair(first, second, frames, config.vertices) for first, second in combinations(actors, 2)),
+        tuple(_figures(person, obstacles, floor, frames, fps) for person in people),
+        tuple(_pair(first, second, frames) for first, second in combinations(people, 2)),
     )
     check_limits(report, config)
     return report
@@ -122,10 +145,10 @@ def check_limits(report: ActorReport, config: ValidationConfig) -> None:
         _check(figures.path_error, config.max_path_error_m, name, "max_path_error_m", "strays", "from")
     for pair in report.pairs:
         nearest = int(pair.distance_m.argmin())
-        if pair.distance_m[nearest] < config.min_actor_distance_m:
+        if -pair.distance_m[nearest] > config.max_actor_overlap_m:
             raise ActorError(
-                f"actors {pair.actors[0]} and {pair.actors[1]} come within {pair.distance_m[nearest]:.3f} m at frame "
-                f"{pair.frames[nearest]}; at least {config.min_actor_distance_m:g} m is required: raise "
+                f"actors {pair.actors[0]} and {pair.actors[1]} are {-pair.distance_m[nearest]:.3f} m in each other at "
+                f"frame {pair.frames[nearest]}; at most {config.max_actor_overlap_m:g} m is allowed: raise "
                 "actors.routes.separation_m, lower actors.count or choose a larger room"
             )
 
@@ -139,83 +162,70 @@ def _check(worst: Worst, limit_m: float, name: str, key: str, verb: str, preposi
         )
 
 
-def _figures(
-    actor: ActorMesh,
-    motion: BodyMotion,
-    skeleton: Skeleton,
-    route: Route,
-    obstacles: Obstacles,
-    floor: Caster,
-    frames: Int64[np.ndarray, " K"],
-    fps: float,
-    config: ValidationConfig,
-) -> ActorFigures:
+def _person(
+    actor: ActorMesh, motion: BodyMotion, skeleton: Skeleton, route: Route, frames: Int64[np.ndarray, " K"], count: int
+) -> _Person:
     joint_m = joint_positions(motion, skeleton)
-    slide_mps = _slide_mps(actor, motion, skeleton, fps)
-    penetration, floating = _sole_figures(actor, motion, skeleton, route, floor)
-    away_m = np.linalg.norm(motion.pelvis_m[:, :2] - route.position_m[:, :2], axis=1)
+    return _Person(actor, motion, skeleton, route, joint_m, make_probe(actor, joint_m, frames, count))
+
+
+def _figures(
+    person: _Person, obstacles: Obstacles, floor: Caster, frames: Int64[np.ndarray, " K"], fps: float
+) -> ActorFigures:
+    slide_mps = _slide_mps(person, fps)
+    penetration, floating = _sole_figures(person, floor)
+    away_m = np.linalg.norm(person.motion.pelvis_m[:, :2] - person.route.position_m[:, :2], axis=1)
     farthest = int(away_m.argmax())
     return ActorFigures(
-        actor.actor,
+        person.actor.actor,
         float(np.median(slide_mps)) if len(slide_mps) > 0 else 0.0,
         float(np.percentile(slide_mps, 95)) if len(slide_mps) > 0 else 0.0,
         penetration,
         floating,
-        scene_depth(actor, joint_m, obstacles, frames, config.vertices),
+        scene_depth(person.actor, person.joint_m, person.probe, obstacles, frames),
         Worst(float(away_m[farthest]), farthest, "its route"),
     )
 
 
-def _rest_of(
-    vertices_m: Float64[np.ndarray, "P 3"], motion: BodyMotion, skeleton: Skeleton, contact: int, frame: int
-) -> Float64[np.ndarray, "P 3"]:
-    """Vertices of a frame where the contact's joint would carry them back to in the rest pose."""
-    joint = joint_index(CONTACT_JOINTS[contact])
-    place_m = contact_positions(motion, skeleton)[frame, contact]
-    return np.asarray((vertices_m - place_m) @ motion.world_from_joint[frame, joint] + skeleton.contact_m[contact])
-
-
-def _sole_zone(
-    actor: ActorMesh, motion: BodyMotion, skeleton: Skeleton, contact: int
-) -> tuple[Int64[np.ndarray, " S"], int]:
+def _sole_zone(person: _Person, contact: int) -> tuple[Int64[np.ndarray, " S"], int]:
     """Vertices of the sole around a contact point, and the one nearest to it, found where the point stands."""
-    standing = np.flatnonzero(motion.contacts[:, contact])
+    standing = np.flatnonzero(person.motion.contacts[:, contact])
     frame = int(standing[0]) if len(standing) > 0 else 0
-    rest_m = _rest_of(actor.vertices_m[frame].astype(np.float64), motion, skeleton, contact, frame)
-    offset_m = rest_m - skeleton.contact_m[contact]
+    world_from_joint = person.motion.world_from_joint[frame, joint_index(CONTACT_JOINTS[contact])]
+    place_m = contact_positions(person.motion, person.skeleton)[frame, contact]
+    # From the contact point, in the axes of the rest pose.
+    offset_m = (person.actor.vertices_m[frame].astype(np.float64) - place_m) @ world_from_joint
     nearest = int(np.linalg.norm(offset_m, axis=1).argmin())
     near = (np.linalg.norm(offset_m[:, :2], axis=1) < _SOLE_RADIUS_M) & (np.abs(offset_m[:, 2]) < _SOLE_THICKNESS_M)
     near[nearest] = True
     return np.flatnonzero(near), nearest
 
 
-def _slide_mps(actor: ActorMesh, motion: BodyMotion, skeleton: Skeleton, fps: float) -> Float64[np.ndarray, " K"]:
+def _slide_mps(person: _Person, fps: float) -> Float64[np.ndarray, " K"]:
     """Speed over the floor of each contact's vertex, over all pairs of frames in which it stands."""
+    contacts = person.motion.contacts
     speeds = [np.zeros(0)]
     for contact in range(len(CONTACTS)):
-        _, vertex = _sole_zone(actor, motion, skeleton, contact)
-        path_m = actor.vertices_m[:, vertex, :2].astype(np.float64)
-        stands = motion.contacts[1:, contact] & motion.contacts[:-1, contact]
+        _, vertex = _sole_zone(person, contact)
+        path_m = person.actor.vertices_m[:, vertex, :2].astype(np.float64)
+        stands = contacts[1:, contact] & contacts[:-1, contact]
         speeds.append(np.linalg.norm(np.diff(path_m, axis=0), axis=1)[stands] * fps)
     return np.concatenate(speeds)
 
 
-def _sole_figures(
-    actor: ActorMesh, motion: BodyMotion, skeleton: Skeleton, route: Route, floor: Caster
-) -> tuple[Worst, Worst]:
+def _sole_figures(person: _Person, floor: Caster) -> tuple[Worst, Worst]:
     """The deepest sole in the floor at any frame, and the highest above it while it is to stand."""
     deepest, highest = Worst(0.0, 0, "the floor"), Worst(0.0, 0, "the floor")
     for contact, name in enumerate(CONTACTS):
-        zone, _ = _sole_zone(actor, motion, skeleton, contact)
-        sole_m = actor.vertices_m[:, zone].astype(np.float64)
-        lowest = sole_m[:, :, 2].argmin(axis=1)
-        point_m = sole_m[np.arange(len(sole_m)), lowest]
-        height_m = point_m[:, 2] - _floor_z_m(floor, point_m, route)
+        zone, _ = _sole_zone(person, contact)
+        sole_m = person.actor.vertices_m[:, zone].astype(np.float64)
+        point_m = sole_m[np.arange(len(sole_m)), sole_m[:, :, 2].argmin(axis=1)]
+        height_m = point_m[:, 2] - _floor_z_m(floor, point_m, person.route)
         place = f"the floor with the {name.replace('_', ' ')}"
         low = int(height_m.argmin())
         if -height_m[low] > deepest.value_m:
             deepest = Worst(float(-height_m[low]), low, place)
-        above_m = np.where(motion.contacts[:, contact], height_m, -np.inf)
+        above_m = np.where(person.motion.contacts[:, contact], height_m, -np.inf)
         high = int(above_m.argmax())
         if above_m[high] > highest.value_m:
             highest = Worst(float(above_m[high]), high, place)
@@ -232,14 +242,18 @@ def _floor_z_m(floor: Caster, point_m: Float64[np.ndarray, "T 3"], route: Route)
     return np.where(near, found_m, route.position_m[:, 2])
 
 
-def _pair(first: ActorMesh, second: ActorMesh, frames: Int64[np.ndarray, " K"], count: int) -> PairFigures:
+def _pair(first: _Person, second: _Person, frames: Int64[np.ndarray, " K"]) -> PairFigures:
     distance_m = np.empty(len(frames))
-    first_vertices, second_vertices = sampled_vertices(first, count), sampled_vertices(second, count)
     for row, frame in enumerate(frames):
-        tree = cKDTree(second.vertices_m[frame, second_vertices])
-        points_m = first.vertices_m[frame, first_vertices]
+        tree = cKDTree(second.actor.vertices_m[frame, second.probe.vertices])
+        points_m = first.actor.vertices_m[frame, first.probe.vertices]
         # A few points bound the search for the others, which is slow only where nothing can be ruled out.
         bound_m = tree.query(points_m[::40])[0].min()
-        near_m = tree.query(points_m, distance_upper_bound=bound_m)[0].min()
-        distance_m[row] = min(bound_m, near_m)
-    return PairFigures((first.actor, second.actor), frames, distance_m)
+        distance_m[row] = min(bound_m, tree.query(points_m, distance_upper_bound=bound_m)[0].min())
+        if distance_m[row] < _TOUCH_M:
+            overlaps_m = [
+                overlap_m(one.actor, one.joint_m, one.probe, other.actor, int(frame))
+                for one, other in ((first, second), (second, first))
+            ]
+            distance_m[row] = -max(overlaps_m) if max(overlaps_m) > 0.0 else distance_m[row]
+    return PairFigures((first.actor.actor, second.actor.actor), frames, distance_m)

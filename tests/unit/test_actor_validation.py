@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 import trimesh
-from jaxtyping import Float32
+from jaxtyping import Float64
 from motion_samples import sample_route, sample_skeleton
 from synthetic_scene import GREY, box, tri
 
@@ -22,27 +22,34 @@ from perpetua.seeding import StageSeed
 
 FPS = 24.0
 SKELETON = sample_skeleton()
-CONFIG = ValidationConfig(frames=20)
+CONFIG = ValidationConfig(frames=20, max_scene_depth_m=0.05)
 
 
-def _tube_body(skeleton: Skeleton, motion: BodyMotion) -> Float32[np.ndarray, "T P 3"]:
-    """Rings of 5 cm around every bone, moved with the bone's upper joint, and the four points of the soles."""
+def _tubes(skeleton: Skeleton, motion: BodyMotion, actor: int) -> ActorMesh:
+    """Tubes of 5 cm around every bone, moved with the bone's upper joint, and the four points of the soles."""
     joint_m = joint_positions(motion, skeleton)
-    parts = []
+    places: list[np.ndarray] = []
+    faces: list[np.ndarray] = []
     for joint, parent in enumerate(BODY_PARENTS):
         if parent < 0:
             continue
-        ends_m = skeleton.joint_m[[parent, joint]]
-        ring = trimesh.creation.cylinder(0.05, segment=ends_m, sections=12).subdivide().vertices
+        tube = trimesh.creation.cylinder(0.05, segment=skeleton.joint_m[[parent, joint]], sections=12).subdivide()
+        faces.append(np.asarray(tube.faces) + sum(part.shape[1] for part in places))
         # Tubes stay above the sole.
-        ring[:, 2] = np.maximum(ring[:, 2], 0.001)
-        offset_m = ring - skeleton.joint_m[parent]
-        parts.append(joint_m[:, parent, None] + offset_m @ np.swapaxes(motion.world_from_joint[:, parent], 1, 2))
+        rest_m = np.maximum(tube.vertices, [-np.inf, -np.inf, 0.001])
+        places.append(_moved(joint_m, motion, parent, rest_m - skeleton.joint_m[parent]))
     for contact, name in enumerate(CONTACT_JOINTS):
         joint = joint_index(name)
-        offset_m = (skeleton.contact_m[contact] - skeleton.joint_m[joint])[None]
-        parts.append(joint_m[:, joint, None] + offset_m @ np.swapaxes(motion.world_from_joint[:, joint], 1, 2))
-    return np.concatenate(parts, axis=1).astype(np.float32)
+        places.append(_moved(joint_m, motion, joint, (skeleton.contact_m[contact] - skeleton.joint_m[joint])[None]))
+    triangles = np.concatenate(faces).astype(np.int32)
+    part = ActorPart("body", triangles, np.zeros((len(triangles), 3, 2), np.float32), GREY)
+    return ActorMesh(actor, 10 + actor, "tubes", (part,), np.concatenate(places, axis=1).astype(np.float32))
+
+
+def _moved(
+    joint_m: Float64[np.ndarray, "T 22 3"], motion: BodyMotion, joint: int, offset_m: Float64[np.ndarray, "P 3"]
+) -> Float64[np.ndarray, "T P 3"]:
+    return joint_m[:, joint, None] + offset_m @ np.swapaxes(motion.world_from_joint[:, joint], 1, 2)
 
 
 def _room(*furniture: tuple[str, trimesh.Trimesh]) -> Room:
@@ -61,9 +68,7 @@ def _walker(actor: int, y_m: float = 0.0) -> tuple[ActorMesh, BodyMotion, Route]
     route = sample_route("straight", FPS, 5.0, actor)
     route = Route(actor, route.position_m + np.array([0.0, y_m, 0.0]), route.heading_rad)
     motion = ProceduralMotion().make(route, SKELETON, "walks", FPS, MotionConfig(), StageSeed(2, 0, "motion"))
-    vertices_m = _tube_body(SKELETON, motion)
-    face = ActorPart("body", np.array([[0, 1, 2]], np.int32), np.zeros((1, 3, 2), np.float32), GREY)
-    return ActorMesh(actor, 10 + actor, "tubes", (face,), vertices_m), motion, route
+    return _tubes(SKELETON, motion, actor), motion, route
 
 
 def _validate(
@@ -130,10 +135,20 @@ def test_what_is_stepped_over_or_stood_on_is_no_obstacle() -> None:
     assert depth.value_m == 0.0
 
 
-def test_actors_that_meet_are_named_with_frame_and_distance() -> None:
-    first, second = _walker(0), _walker(1, 0.15)
-    with pytest.raises(ActorError, match=r"actors 0 and 1 come within 0\.0\d+ m at frame \d+; at least 0.02 m"):
-        _validate([first, second], _room())
+def test_actors_that_go_through_each_other_are_named_with_frame_and_depth() -> None:
+    with pytest.raises(ActorError, match=r"actors 0 and 1 are 0\.\d+ m in each other at frame \d+; at most 0.03 m"):
+        _validate([_walker(0), _walker(1, 0.3)], _room())
+
+
+def test_actors_that_nearly_touch_pass_with_a_small_distance() -> None:
+    first, second = _walker(0), _walker(0, 0.0)
+    span_m = float(first[0].vertices_m[..., 1].max() - first[0].vertices_m[..., 1].min())
+    aside = np.array([0.0, span_m + 0.005, 0.0])
+    route = Route(1, second[2].position_m + aside, second[2].heading_rad)
+    motion = replace(second[1], actor=1, pelvis_m=second[1].pelvis_m + aside)
+    mesh = replace(second[0], actor=1, vertices_m=(second[0].vertices_m + aside).astype(np.float32))
+    (pair,) = _validate([first, (mesh, motion, route)], _room(), ValidationConfig(frames=120)).pairs
+    assert 0.004 < pair.distance_m.min() < 0.2
 
 
 def test_a_pelvis_off_its_route_is_named() -> None:

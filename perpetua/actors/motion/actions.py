@@ -75,7 +75,7 @@ def _words(text: str) -> frozenset[str]:
 
 _PHONE = HandReach((0.19, 0.03, 0.17), (0.3, 0.6, -1.0), roll_rad=-1.2)
 _SCREEN = HandReach((0.47, -0.22, -0.12), (-0.2, 0.45, -1.0), roll_rad=-0.8)
-_WAVE = HandReach((0.24, 0.32, 0.26), (0.0, 1.0, -0.8), swing=(0.0, 0.13, 0.0), swing_hz=1.5)
+_WAVE = HandReach((0.3, 0.2, 0.28), (0.1, 0.8, -1.0), swing=(0.0, 0.11, 0.0), swing_hz=1.5)
 _POINT = HandReach((0.93, 0.1, 0.02), (-0.3, 0.6, -1.0))
 _GESTURE = HandReach((0.45, 0.05, -0.3), (-0.5, 0.6, -1.0), swing=(0.06, 0.06, 0.06), swing_hz=0.8)
 _BOX = HandReach((0.56, 0.0, -0.36), (-0.6, 0.5, -1.0))
