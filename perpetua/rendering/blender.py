@@ -39,7 +39,6 @@ def run_script(
     scratch: Path,
     silence_timeout_s: float,
     on_event: Callable[[Event], None],
-    threads: int | None = None,
 ) -> None:
     """Runs a script of Blender on a job until it ends; the process never outlives this call or this process.
 
@@ -50,7 +49,6 @@ def run_script(
         scratch: existing folder for the log ``<script>.log`` and Blender's private settings.
         silence_timeout_s: the process is killed after this long without an event, seconds.
         on_event: called with each event: a line of JSON on stdout with the key "event".
-        threads: OpenMP and BLAS threads of the process; None leaves them alone.
 
     Raises:
         BlenderError: the process ended with an error or by a signal, or was silent for too long.
@@ -64,7 +62,7 @@ def run_script(
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=log,
-            env=_environment(scratch, threads),
+            env=_environment(scratch),
             start_new_session=True,
         )
         try:
@@ -89,14 +87,11 @@ def _command(script: Path, job_path: Path, blender: str | None) -> list[str]:
     return [program, *options, "-P", str(script), "--", str(job_path)]
 
 
-def _environment(scratch: Path, threads: int | None) -> dict[str, str]:
+def _environment(scratch: Path) -> dict[str, str]:
     """Ours, with a settings folder of Blender's own: none of the user's add-ons, nothing written to their home."""
     resources = scratch.resolve() / "blender_user"
     resources.mkdir(exist_ok=True)
-    environment = os.environ | {"BLENDER_USER_RESOURCES": str(resources), "PYTHONHASHSEED": "0"}
-    if threads is not None:
-        environment |= {"OMP_NUM_THREADS": str(threads), "OPENBLAS_NUM_THREADS": str(threads)}
-    return environment
+    return os.environ | {"BLENDER_USER_RESOURCES": str(resources), "PYTHONHASHSEED": "0"}
 
 
 def _read_events(stdout: IO[bytes], silence_timeout_s: float, on_event: Callable[[Event], None]) -> bool:

@@ -120,7 +120,7 @@ def _give_up(failure: BlenderError, frame: int, done: int, frame_count: int, res
     return RenderError(
         f"rendering stopped at frame {frame} ({done} of {frame_count} frames are done and kept) after {restarts} "
         f"restarts: {failure.reason}; if memory ran out, lower render.width_px, render.height_px or render.max_texels; "
-        "if a frame takes long, raise render.frame_timeout_s; render.max_restarts allows more tries"
+        "if a frame takes long, raise render.frame_timeout_s; on a GPU, try --device cpu"
         + (f"\nBlender's last lines:\n{failure.tail}" if failure.tail else "")
     )
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -34,7 +35,7 @@ NORMAL = np.array([0.36, -0.48, 0.8])
 OFFSET_M = -0.5
 # The actor's front is a square patch parallel to the plane, this far before it at frame t.
 PATCH_HEIGHT_M = np.array([0.3, 0.5, 0.75])
-CONFIG = RenderConfig(width_px=64, height_px=48, samples=2, denoise=False)
+CONFIG = RenderConfig(width_px=64, height_px=48, samples=8, denoise=True)
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 TWO_TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 
@@ -134,6 +135,21 @@ def test_exposure_makes_up_for_the_lamps(tmp_path: Path, undisturbed: tuple[Rend
         levels.append(float(np.asarray(Image.open(BytesIO(view.jpeg[0]))).mean()))
     assert 60.0 < levels[0] < 190.0
     assert abs(levels[0] - levels[1]) < 3.0
+
+
+def test_white_balance_takes_the_lamps_colour_out(tmp_path: Path) -> None:
+    """A grey plane under an orange lamp."""
+    camera = CameraPath(0, _cameras()[0].world_from_camera[:1], _cameras()[0].intrinsics)
+    room = _room()
+    orange = replace(room, lights=(replace(room.lights[0], power_w=4e5, color=(1.0, 0.6, 0.3)),))
+    red_per_blue = []
+    for strength in (0.0, 1.0):
+        config = CONFIG.model_copy(update={"white_balance": strength})
+        (view,) = render_views(orange, (), (camera,), config, "cpu", tmp_path / f"{strength:g}", lambda *_: None)
+        red, _, blue = np.asarray(Image.open(BytesIO(view.jpeg[0])), np.float64).mean(axis=(0, 1))
+        red_per_blue.append(red / blue)
+    assert red_per_blue[0] > 1.4
+    assert 0.95 < red_per_blue[1] < 1.05
 
 
 def test_background_has_no_depth_and_no_index_and_a_missing_gpu_is_said(
