@@ -17,9 +17,9 @@ BAKE_SCRIPT = SCRIPT_FOLDER / "bake_materials.py"
 # Fewer samples than this in all cost less than baking does.
 MIN_SAMPLES = 2_000_000
 # Baking stays a small part of rendering: so many samples for each texel, which takes three evaluations.
-SAMPLES_PER_TEXEL = 50
+SAMPLES_PER_TEXEL = 20
 # Textures with fewer texels than this look blurred at any resolution.
-MIN_TEXELS = 300_000
+MIN_TEXELS = 600_000
 
 
 def texel_budget(config: RenderConfig, images: int) -> int:

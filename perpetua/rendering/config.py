@@ -29,7 +29,7 @@ class RenderConfig(Section):
         True, description="bake a room's procedural materials to images where that saves time; false: never"
     )
     max_texels: int = Field(
-        4_000_000, ge=10_000, le=100_000_000, description="most texels baked from a room's procedural materials"
+        8_000_000, ge=10_000, le=100_000_000, description="most texels baked from a room's procedural materials"
     )
     frame_timeout_s: float = Field(1800.0, ge=5.0, description="longest time without progress, seconds")
     max_restarts: int = Field(3, ge=0, le=100, description="restarts of Blender after a crash or a hang")
