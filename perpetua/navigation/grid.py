@@ -10,7 +10,7 @@ from perpetua.errors import NavigationError
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.raster import Raster, inside_polygon, touched_cells
 from perpetua.navigation.types import NavGrid
-from perpetua.rooms.types import Room
+from perpetua.rooms.types import Room, SceneObject
 
 # Obstacles are rasterised on cells of at most this side, so that the grid's cells need not be fine.
 FINE_CELL_M = 0.02
@@ -96,12 +96,18 @@ def _obstacles(
     high_z_m = np.where(no_floor, -np.inf, floor_z_m + config.body_height_m).ravel()
     lowest_m = float(np.nanmin(floor_z_m)) + config.step_m
     highest_m = float(np.nanmax(floor_z_m)) + config.body_height_m
-    blocked = np.zeros(low_z_m.shape, bool)
-    for thing in room.objects:
-        for touches in touched_cells(fine, thing.mesh.vertices_m[thing.mesh.faces], lowest_m, highest_m):
+    blocked = no_floor.ravel()
+    # Large things first: most small ones stand on them and need no closer look.
+    for thing in sorted(room.objects, key=lambda other: -_footprint_m2(other)):
+        corners_m = thing.mesh.vertices_m[thing.mesh.faces]
+        for touches in touched_cells(fine, corners_m, lowest_m, highest_m, blocked.reshape(fine.shape)):
             hit = (touches.high_z_m > low_z_m[touches.cell]) & (touches.low_z_m < high_z_m[touches.cell])
             blocked[touches.cell[hit]] = True
-    return np.asarray(blocked.reshape(fine.shape) | no_floor | _too_high_steps(floor_z_m, config.step_m))
+    return np.asarray(blocked.reshape(fine.shape) | _too_high_steps(floor_z_m, config.step_m))
+
+
+def _footprint_m2(thing: SceneObject) -> float:
+    return float(np.ptp(thing.mesh.vertices_m[:, :2], axis=0).prod()) if len(thing.mesh.vertices_m) else 0.0
 
 
 def _too_high_steps(floor_z_m: Float32[np.ndarray, "X Y"], step_m: float) -> Bool[np.ndarray, "X Y"]:

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Float64, Int64
+from jaxtyping import Bool, Float, Float32, Float64, Int64, Integer
 
-CHUNK_TRIANGLES = 200_000
+CHUNK_TRIANGLES = 12_000
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,11 @@ class Touches:
 
 
 def touched_cells(
-    raster: Raster, corners_m: Float[np.ndarray, "F 3 3"], low_z_m: float, high_z_m: float
+    raster: Raster,
+    corners_m: Float[np.ndarray, "F 3 3"],
+    low_z_m: float,
+    high_z_m: float,
+    settled: Bool[np.ndarray, "X Y"] | None = None,
 ) -> Iterator[Touches]:
     """The cells that triangles touch between two heights, in chunks.
 
@@ -46,19 +50,37 @@ def touched_cells(
         corners_m: triangle corners in the world.
         low_z_m: pieces entirely below are left out.
         high_z_m: pieces entirely above are left out.
+        settled: cells that are of no more interest; pieces over these alone are left out. It is looked at anew for
+            each chunk, so the caller may go on filling it.
     """
     low_m = np.append(raster.origin_m - 0.5 * raster.cell_m, low_z_m)
     high_m = np.append(raster.origin_m + raster.cell_m * (np.array(raster.shape) - 0.5), high_z_m)
     for start in range(0, len(corners_m), CHUNK_TRIANGLES):
         waiting = corners_m[start : start + CHUNK_TRIANGLES].astype(np.float32)
+        open_cells = None if settled is None else np.pad(~settled, ((1, 0), (1, 0))).cumsum(0, np.int32).cumsum(1)
         while len(waiting):
             low, high = _bounds(waiting)
             relevant = np.logical_and.reduce([*(high >= low_m).T, *(low <= high_m).T])
+            if open_cells is not None:
+                relevant[relevant] = _count(raster, open_cells, low[relevant], high[relevant]) > 0
             small = np.maximum(high[:, 0] - low[:, 0], high[:, 1] - low[:, 1]) <= raster.cell_m
             claimed = relevant & small
             if claimed.any():
                 yield _claim(raster, low[claimed], high[claimed])
             waiting = _halve(waiting[relevant & ~small])
+
+
+def _count(
+    raster: Raster, sums: Integer[np.ndarray, "A B"], low: Float32[np.ndarray, "F 3"], high: Float32[np.ndarray, "F 3"]
+) -> Integer[np.ndarray, " F"]:
+    """What a summed-area table (Crow 1984) counts in the cells of each rectangle."""
+    first, last = (_cells(raster, edge) for edge in (low, high))
+    (i0, j0), (i1, j1) = np.maximum(first, 0).T, np.minimum(last + 1, raster.shape).T
+    return np.asarray(sums[i1, j1] - sums[i0, j1] - sums[i1, j0] + sums[i0, j0])
+
+
+def _cells(raster: Raster, place_m: Float32[np.ndarray, "F 3"]) -> Int64[np.ndarray, "F 2"]:
+    return np.floor((place_m[:, :2] - raster.origin_m) / raster.cell_m + 0.5).astype(np.int64)
 
 
 def _bounds(corners_m: Float32[np.ndarray, "F 3 3"]) -> tuple[Float32[np.ndarray, "F 3"], Float32[np.ndarray, "F 3"]]:
@@ -81,9 +103,7 @@ def _halve(corners_m: Float32[np.ndarray, "F 3 3"]) -> Float32[np.ndarray, "G 3 
 
 
 def _claim(raster: Raster, low: Float32[np.ndarray, "F 3"], high: Float32[np.ndarray, "F 3"]) -> Touches:
-    first, last = (
-        np.floor((edge[:, :2] - raster.origin_m) / raster.cell_m + 0.5).astype(np.int64) for edge in (low, high)
-    )
+    first, last = (_cells(raster, edge) for edge in (low, high))
     touches = []
     # No piece is wider than a cell, so it touches at most two columns and two rows.
     for columns in (first[:, 0], last[:, 0]):

@@ -4,7 +4,7 @@ A walk is a chain of geodesic legs between targets. Targets are drawn on floor t
 sharp turns on the way; now and then a person stops for a moment beside furniture and looks at it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -23,7 +23,9 @@ ACCELERATION_MPS2 = 1.2
 TURN_RATE_RADPS = 1.8
 PATH_STEP_M = 0.04
 PATH_SMOOTHING_M = 0.22
-STANDING_MPS = 0.12
+HEADING_SMOOTHING_S = 0.15
+# Turns start and end gently.
+SETTLING_S = 0.3
 
 
 @dataclass(frozen=True)
@@ -44,11 +46,25 @@ class Walk:
 
 @dataclass(frozen=True)
 class _Stop:
-    """A pause at a distance along a path."""
+    """A pause at a distance along a path: turning to what there is to see, looking at it, turning to go on."""
 
     at_m: float
-    seconds: float
-    facing_rad: float | None
+    arrival_rad: float
+    facing_rad: float
+    departure_rad: float
+    looking_s: float
+
+    @property
+    def turning_s(self) -> tuple[float, float]:
+        """Seconds of the turns before and after looking."""
+        before_rad = _angle_between(self.arrival_rad, self.facing_rad)
+        after_rad = _angle_between(self.facing_rad, self.departure_rad)
+        return before_rad / TURN_RATE_RADPS + SETTLING_S, after_rad / TURN_RATE_RADPS + SETTLING_S
+
+    @property
+    def seconds(self) -> float:
+        """Length of the pause."""
+        return self.looking_s + sum(self.turning_s)
 
 
 class WalkableFloor:
@@ -120,10 +136,11 @@ def random_walk(
     leg_ends_m = np.cumsum([_length_m(leg) for leg in legs])
     # Smoothing shortens a path a little, so places along it move in proportion.
     shrink = distance_m[-1] / max(leg_ends_m[-1], 1e-9)
-    stops = [_Stop(stop.at_m * shrink, stop.seconds, stop.facing_rad) for stop in stops]
+    stops = [replace(stop, at_m=stop.at_m * shrink) for stop in stops]
     travelled_m, standing = _drive(distance_m, path_m, leg_ends_m * shrink, speeds, stops, steps, step_s, rng)
     position_m = np.stack([np.interp(travelled_m, distance_m, path_m[:, axis]) for axis in range(2)], axis=1)
-    return Walk(position_m, _headings(path_m, distance_m, travelled_m, standing, stops))
+    heading_rad = _headings(path_m, distance_m, travelled_m, standing, stops, step_s)
+    return Walk(position_m, heading_rad)
 
 
 def _wander(
@@ -134,24 +151,22 @@ def _wander(
     stops: list[_Stop] = []
     speeds: list[float] = []
     here, elapsed_s, distance_m = start, 0.0, 0.0
-    direction_rad = None
-    # More than enough time, since smoothing shortens paths and stops may be rounded away.
+    arrival_rad, stop_here = None, False
+    # More than enough time, since smoothing shortens paths.
     while elapsed_s < 1.5 * seconds + 2.0:
-        stop_here = float(rng.uniform()) < pace.stop_share
-        leg = _next_leg(floor, rng, here, direction_rad, legs, stop_here)
-        turn_rad = 0.0 if direction_rad is None else _angle_between(direction_rad, _direction(leg[:4]))
-        if turn_rad > SHARP_TURN_RAD and not (stops and stops[-1].at_m == distance_m):
-            stops.append(_Stop(distance_m, float(rng.uniform(0.2, 0.5)) + turn_rad / TURN_RATE_RADPS, None))
-            elapsed_s += stops[-1].seconds
+        stop_next = float(rng.uniform()) < pace.stop_share
+        leg = _next_leg(floor, rng, here, None if stop_here else arrival_rad, legs, stop_next)
+        departure_rad = _direction(leg[:6])
+        if arrival_rad is not None and stop_here:
+            facing_rad = floor.facing_obstacle_rad(here)
+            stops.append(_Stop(distance_m, arrival_rad, facing_rad, departure_rad, float(rng.uniform(0.5, 2.0))))
+        elif arrival_rad is not None and _angle_between(arrival_rad, departure_rad) > SHARP_TURN_RAD:
+            stops.append(_Stop(distance_m, arrival_rad, arrival_rad, departure_rad, 0.0))
         speeds.append(float(np.clip(rng.normal(1.0, 0.14), 0.7, 1.35)) * pace.speed_mps)
-        length_m = _length_m(leg)
-        distance_m += length_m
-        elapsed_s += length_m / speeds[-1]
+        distance_m += _length_m(leg)
+        elapsed_s = distance_m / pace.speed_mps + sum(stop.seconds for stop in stops)
         legs.append(leg)
-        here, direction_rad = floor.nearest(leg[-1]), _direction(leg[-4:])
-        if stop_here:
-            stops.append(_Stop(distance_m, float(rng.uniform(1.2, 3.0)), floor.facing_obstacle_rad(here)))
-            elapsed_s += stops[-1].seconds
+        here, arrival_rad, stop_here = floor.nearest(leg[-1]), _direction(leg[-6:]), stop_next
     return legs, stops, speeds
 
 
@@ -267,20 +282,30 @@ def _headings(
     travelled_m: Float64[np.ndarray, " T"],
     standing: Int64[np.ndarray, " T"],
     stops: list[_Stop],
+    step_s: float,
 ) -> Float64[np.ndarray, " T"]:
-    """Along the path while walking; at a stop turning from arrival, past what there is to see, to departure."""
-    ahead = np.stack(
-        [np.interp(travelled_m + side, distance_m, path_m[:, axis]) for side in (-0.05, 0.05) for axis in range(2)]
-    )
-    heading = np.arctan2(ahead[3] - ahead[1], ahead[2] - ahead[0])
+    """Along the path while walking; at a stop from arrival by way of what there is to see to departure."""
+    along_rad = np.unwrap(np.arctan2(*np.gradient(path_m, axis=0).T[::-1]))
+    heading_rad = np.interp(travelled_m, distance_m, along_rad)
+    # Close to a stop the path's own direction is about to flip.
     known = standing < 0
     for number, stop in enumerate(stops):
+        known &= np.abs(travelled_m - stop.at_m) > PATH_SMOOTHING_M
         steps = np.flatnonzero(standing == number)
-        if stop.facing_rad is not None and len(steps) >= 3:
-            middle = steps[len(steps) // 3 : 2 * len(steps) // 3 + 1]
-            heading[middle] = stop.facing_rad
-            known[middle] = True
+        if not len(steps):
+            continue
+        turning_s = stop.turning_s[0]
+        first = steps[0] + np.array([0, round(turning_s / step_s), round((turning_s + stop.looking_s) / step_s)])
+        for start, end, direction_rad in (
+            (first[0] - 1, first[0], stop.arrival_rad),
+            (first[1], first[2], stop.facing_rad),
+            (steps[0] + round(stop.seconds / step_s), None, stop.departure_rad),
+        ):
+            place = slice(max(start, 0), (start + 1) if end is None else max(end, start + 1))
+            heading_rad[place] = direction_rad
+            known[place] = True
     if not known.any():
-        return np.full(len(heading), heading[0])
-    steps = np.arange(len(heading))
-    return np.interp(steps, steps[known], np.unwrap(heading[known]))
+        return np.full(len(heading_rad), heading_rad[0])
+    steps = np.arange(len(heading_rad))
+    filled_rad = np.interp(steps, steps[known], np.unwrap(heading_rad[known]))
+    return ndimage.gaussian_filter1d(filled_rad, HEADING_SMOOTHING_S / step_s, mode="nearest")
