@@ -145,9 +145,9 @@ def random_walk(
 
 def _wander(
     floor: WalkableFloor, rng: np.random.Generator, pace: Pace, seconds: float, start: int
-) -> tuple[list[Float64[np.ndarray, "K 2"]], list[_Stop], list[float]]:
+) -> tuple[list[Float64[np.ndarray, "_ 2"]], list[_Stop], list[float]]:
     """Legs, the stops between them and the speed of each leg, long enough for the time."""
-    legs: list[Float64[np.ndarray, "K 2"]] = []
+    legs: list[Float64[np.ndarray, "_ 2"]] = []
     stops: list[_Stop] = []
     speeds: list[float] = []
     here, elapsed_s, distance_m = start, 0.0, 0.0
@@ -175,7 +175,7 @@ def _next_leg(
     rng: np.random.Generator,
     here: int,
     direction_rad: float | None,
-    legs: list[Float64[np.ndarray, "K 2"]],
+    legs: list[Float64[np.ndarray, "_ 2"]],
     stop_here: bool,
 ) -> Float64[np.ndarray, "K 2"]:
     """The best of some random targets: unvisited, far enough, ahead, and beside furniture where a stop is planned."""
