@@ -15,6 +15,7 @@ from perpetua.config_base import Section
 from perpetua.errors import ConfigError
 from perpetua.formats.config import ExportConfig
 from perpetua.navigation.config import NavigationConfig
+from perpetua.pipeline.config import RedrawConfig
 from perpetua.rendering.config import RenderConfig
 from perpetua.rooms.config import RoomsConfig
 from perpetua.tracks.config import TracksConfig
@@ -41,6 +42,7 @@ class Config(Section):
     tracks: TracksConfig = Field(default_factory=TracksConfig)
     export: ExportConfig = Field(default_factory=ExportConfig)
     audit: AuditConfig = Field(default_factory=AuditConfig)
+    redraw: RedrawConfig = Field(default_factory=RedrawConfig)
 
 
 def presets() -> dict[str, Path]:

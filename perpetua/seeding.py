@@ -31,12 +31,16 @@ def stream(seed: int, room: int, stage: str, *names: str | int) -> np.random.Gen
 
 @dataclass(frozen=True)
 class StageSeed:
-    """What one stage of one room draws from; ``perpetua.pipeline`` makes one per stage and room."""
+    """What one stage of one room draws from; ``perpetua.pipeline`` makes one per stage and room.
+
+    ``redraw`` counts the draws that were rejected before this one.
+    """
 
     seed: int
     room: int
     stage: str
+    redraw: int = 0
 
     def stream(self, *names: str | int) -> np.random.Generator:
         """The independent stream of this stage with these names."""
-        return stream(self.seed, self.room, self.stage, *names)
+        return stream(self.seed, self.room, self.stage, *names, *(("redraw", self.redraw) if self.redraw else ()))

@@ -50,6 +50,11 @@ class OutputLayout:
         """Why the last attempt at the room failed, if it did."""
         return self.work_folder / "failure.json"
 
+    @property
+    def rejections_file(self) -> Path:
+        """The keys of stages whose draw was rejected, with the reasons, so that no run tries them again."""
+        return self.work_folder / "rejected.json"
+
     @contextmanager
     def lock(self) -> Iterator[None]:
         """Keeps two runs on this machine from working on one room at once; the system frees it if we die."""

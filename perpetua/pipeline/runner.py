@@ -1,6 +1,5 @@
-"""Takes one room through the stages: skips what is done, computes the rest, publishes the sequence."""
+"""Takes one room through the stages: skips what is done, computes the rest, redraws, publishes the sequence."""
 
-import json
 import shutil
 import time
 from dataclasses import dataclass, field
@@ -8,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from perpetua.config import Config
-from perpetua.errors import PerpetuaError
+from perpetua.errors import ActorError, CameraError, PerpetuaError, RouteError, TrackError
 from perpetua.pipeline import codec, store
 from perpetua.pipeline.events import Event, OnEvent
 from perpetua.pipeline.layout import OutputLayout
@@ -16,6 +15,9 @@ from perpetua.pipeline.memory import PeakMemory
 from perpetua.pipeline.scripts import scripts_sha256
 from perpetua.pipeline.stages import AUDIT_FILE, SEQUENCE_FOLDER, STAGES, Stage, StageContext
 from perpetua.seeding import StageSeed
+
+# Errors that another draw of the routes, or of the room, may not meet.
+REDRAWN = (RouteError, ActorError, CameraError, TrackError)
 
 
 @dataclass
@@ -29,12 +31,12 @@ class RoomRun:
     device: str
     on_event: OnEvent
     stages: tuple[Stage, ...] = STAGES
+    rejected: int = 0
     keys: dict[str, str] = field(default_factory=dict)
     values: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.layout = OutputLayout(self.out, self.config.export.split, self.seed, self.room)
-        self.keys = stage_keys(self.config, self.seed, self.room, self.stages)
 
     def run(self, until: str) -> None:
         """Runs the stages up to and with ``until``; the last one publishes the sequence.
@@ -43,30 +45,51 @@ class RoomRun:
             PerpetuaError: a stage failed; what is finished stays.
         """
         self._report("room_started")
-        if not self._is_published():
+        if published_redraw(self.layout, self.config, self.stages) is None:
             with self.layout.lock():
-                self._run_stages(until)
+                self._run_draws(until)
         self.layout.failure_file.unlink(missing_ok=True)
         self._report("room_finished")
 
-    def _run_stages(self, until: str) -> None:
+    def _run_draws(self, until: str) -> None:
+        """Draws that an earlier run found wanting are not tried again, so the outcome has no history."""
+        while True:
+            self.rejected = rejected_draws(self.layout, self.config, self.stages)
+            self.keys = stage_keys(self.config, self.seed, self.room, self.rejected, self.stages)
+            self.values.clear()
+            failed = self._run_stages(until)
+            if failed is None:
+                return
+            stage, error = failed
+            self._reject(stage, error)
+
+    def _run_stages(self, until: str) -> tuple[Stage, PerpetuaError] | None:
+        """None when all went well, or the stage whose draw has to be redrawn."""
         for stage in self.stages:
             try:
                 self._run_stage(stage)
+            except REDRAWN as error:
+                return stage, error
             except PerpetuaError as error:
-                store.write_json(self.layout.failure_file, {"stage": stage.name, "reason": str(error)})
+                self._note_failure(stage, error)
                 raise
             if stage.name == until:
                 break
         if until == self.stages[-1].name:
             self._publish()
+        return None
 
-    def _is_published(self) -> bool:
-        try:
-            audit = json.loads((self.layout.sequence_folder / AUDIT_FILE).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return False
-        return isinstance(audit, dict) and audit.get("key") == self.keys[self.stages[-1].name]
+    def _reject(self, stage: Stage, error: PerpetuaError) -> None:
+        rejections = store.read_json(self.layout.rejections_file) | {self.keys[stage.name]: str(error)}
+        store.write_json(self.layout.rejections_file, rejections)
+        limits = self.config.redraw
+        if self.rejected + 1 >= (limits.routes_per_room + 1) * (limits.rooms + 1):
+            self._note_failure(stage, error)
+            raise error
+        self._report("message", text=f"draw {self.rejected + 1} rejected by {stage.name}: {error}")
+
+    def _note_failure(self, stage: Stage, error: PerpetuaError) -> None:
+        store.write_json(self.layout.failure_file, {"stage": stage.name, "reason": str(error)})
 
     def _run_stage(self, stage: Stage) -> None:
         folder = store.StageFolder(self.layout.work_folder, stage.number, stage.name)
@@ -105,7 +128,7 @@ class RoomRun:
 
         return StageContext(
             config=self.config,
-            seed=StageSeed(self.seed, self.room, stage.name),
+            seed=StageSeed(self.seed, self.room, stage.name, stage.redraw(self.rejected, self.config.redraw)),
             folder=partial,
             device=self.device,
             stage_folders={name: self._folder_of(name) for name in stage.needs},
@@ -129,15 +152,18 @@ class RoomRun:
         shutil.rmtree(partial, ignore_errors=True)
         target.parent.mkdir(parents=True, exist_ok=True)
         store.link_tree(self._folder_of("export") / SEQUENCE_FOLDER, partial)
-        audit = json.loads((self._folder_of("audit") / AUDIT_FILE).read_text(encoding="utf-8"))
-        store.write_json(partial / AUDIT_FILE, {**audit, "key": self.keys[self.stages[-1].name]})
+        audit = store.read_json(self._folder_of("audit") / AUDIT_FILE)
+        last = self.stages[-1].name
+        store.write_json(partial / AUDIT_FILE, {**audit, "key": self.keys[last], "rejected_draws": self.rejected})
         store.replace_folder(partial, target)
 
     def _report(self, kind: Any, stage: str = "", **details: Any) -> None:
         self.on_event(Event(kind, self.room, stage, **details))
 
 
-def stage_keys(config: Config, seed: int, room: int, stages: tuple[Stage, ...] = STAGES) -> dict[str, str]:
+def stage_keys(
+    config: Config, seed: int, room: int, rejected: int = 0, stages: tuple[Stage, ...] = STAGES
+) -> dict[str, str]:
     """The key of every stage of one room: it changes when the stage, its settings, or anything upstream does."""
     keys: dict[str, str] = {}
     for stage in stages:
@@ -148,8 +174,32 @@ def stage_keys(config: Config, seed: int, room: int, stages: tuple[Stage, ...] =
                 "settings": stage.section(config),
                 "seed": seed,
                 "room": room,
+                "redraw": stage.redraw(rejected, config.redraw),
                 "upstream": {name: keys[name] for name in stage.needs},
                 "scripts": scripts_sha256(stage.scripts),
             }
         )
     return keys
+
+
+def rejected_draws(layout: OutputLayout, config: Config, stages: tuple[Stage, ...] = STAGES) -> int:
+    """How many draws of a room are known to break a hard limit under this config."""
+    rejections = store.read_json(layout.rejections_file)
+    rejected = 0
+    limit = (config.redraw.routes_per_room + 1) * (config.redraw.rooms + 1)
+    while rejected + 1 < limit:
+        keys = stage_keys(config, layout.seed, layout.room, rejected, stages)
+        if not any(key in rejections for key in keys.values()):
+            break
+        rejected += 1
+    return rejected
+
+
+def published_redraw(layout: OutputLayout, config: Config, stages: tuple[Stage, ...] = STAGES) -> int | None:
+    """How many draws were rejected before the published sequence; None if none is published under this config."""
+    audit = store.read_json(layout.sequence_folder / AUDIT_FILE)
+    rejected = audit.get("rejected_draws")
+    if not isinstance(rejected, int):
+        return None
+    keys = stage_keys(config, layout.seed, layout.room, rejected, stages)
+    return rejected if audit.get("key") == keys[stages[-1].name] else None

@@ -21,6 +21,7 @@ from perpetua.errors import AuditError
 from perpetua.formats import EXPORTERS
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
+from perpetua.pipeline.config import RedrawConfig
 from perpetua.pipeline.record import sequence_record
 from perpetua.pipeline.store import write_json
 from perpetua.rendering.job import FRAME_FOLDER
@@ -70,12 +71,25 @@ class StageContext:
         return values
 
 
+def _never(rejected: int, config: RedrawConfig) -> int:
+    return 0
+
+
+def _every_time(rejected: int, config: RedrawConfig) -> int:
+    return rejected
+
+
+def _when_routes_are_spent(rejected: int, config: RedrawConfig) -> int:
+    return rejected // (config.routes_per_room + 1)
+
+
 @dataclass(frozen=True)
 class Stage:
     """One row of the table.
 
     ``section`` picks the settings that the key depends on; ``version`` counts changes of the code; ``scripts`` are
-    the Blender scripts it starts; a ``resumable`` stage goes on from what an interrupted run left; ``leftovers``
+    the Blender scripts it starts; ``redraw`` turns the number of draws rejected so far into what its streams and
+    key get of it; a ``resumable`` stage goes on from what an interrupted run left; ``leftovers``
     are names in its folder that only serve to go on, removed when it is finished.
     """
 
@@ -86,6 +100,7 @@ class Stage:
     section: Callable[[Config], dict[str, Any]]
     run: Callable[[StageContext], object]
     scripts: tuple[str, ...] = ()
+    redraw: Callable[[int, RedrawConfig], int] = _never
     resumable: bool = False
     leftovers: tuple[str, ...] = ()
 
@@ -213,9 +228,26 @@ _FRAMES = "sequence.frames"
 _FPS = "sequence.fps"
 
 STAGES = (
-    Stage(10, "room", 1, (), _settings("rooms", "navigation"), _room, scripts=("infinigen_room.py",)),
+    Stage(
+        10,
+        "room",
+        1,
+        (),
+        _settings("rooms", "navigation"),
+        _room,
+        scripts=("infinigen_room.py",),
+        redraw=_when_routes_are_spent,
+    ),
     Stage(20, "navigation", 1, ("room",), _settings("navigation"), _navigation),
-    Stage(30, "routes", 1, ("room", "navigation"), _settings("actors.count", "actors.routes", _FRAMES, _FPS), _routes),
+    Stage(
+        30,
+        "routes",
+        1,
+        ("room", "navigation"),
+        _settings("actors.count", "actors.routes", _FRAMES, _FPS),
+        _routes,
+        redraw=_every_time,
+    ),
     Stage(40, "motion", 1, ("routes",), _settings("actors", _FPS), _motion),
     Stage(50, "actors", 1, ("room", "routes", "motion"), _settings("actors", _FPS), _actors),
     Stage(

@@ -1,6 +1,5 @@
 """``perpetua status`` and ``perpetua clean``: what an output folder holds."""
 
-import json
 import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,9 +9,9 @@ from typing import Any
 from rich.table import Table
 
 from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout, RunRecord, read_run
-from perpetua.pipeline.runner import stage_keys
-from perpetua.pipeline.stages import AUDIT_FILE, STAGES
-from perpetua.pipeline.store import StageFolder
+from perpetua.pipeline.runner import published_redraw, rejected_draws, stage_keys
+from perpetua.pipeline.stages import STAGES
+from perpetua.pipeline.store import StageFolder, read_json
 
 
 @dataclass(frozen=True)
@@ -83,28 +82,22 @@ def read_status(out: Path) -> StatusReport:
 
 def _room_status(out: Path, run: RunRecord, room: int) -> RoomStatus:
     layout = OutputLayout(out, run.config.export.split, run.seed, room)
-    keys = stage_keys(run.config, run.seed, room)
+    published = published_redraw(layout, run.config)
+    rejected = rejected_draws(layout, run.config) if published is None else published
+    keys = stage_keys(run.config, run.seed, room, rejected)
     seconds: dict[str, float] = {}
     for stage in STAGES:
         manifest = StageFolder(layout.work_folder, stage.number, stage.name).manifest()
         if manifest is not None and manifest.key == keys[stage.name]:
             seconds[stage.name] = manifest.seconds
-    failure = _read_json(layout.failure_file)
+    failure = read_json(layout.failure_file)
     return RoomStatus(
         room=room,
-        finished=_read_json(layout.sequence_folder / AUDIT_FILE).get("key") == keys[STAGES[-1].name],
+        finished=published is not None,
         seconds=seconds,
         failed_stage=failure.get("stage"),
         reason=failure.get("reason"),
     )
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
 
 
 def status_table(report: StatusReport) -> Table:

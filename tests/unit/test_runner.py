@@ -1,8 +1,10 @@
 """The runner on a table of three small stages: what is computed, what is skipped, what is published."""
 
 import json
+import shutil
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,7 +13,7 @@ import pytest
 
 from perpetua.cluster.local import run_rooms
 from perpetua.config import Config
-from perpetua.errors import RouteError
+from perpetua.errors import AuditError, RouteError
 from perpetua.pipeline.events import Event, OnEvent
 from perpetua.pipeline.layout import OutputLayout
 from perpetua.pipeline.runner import RoomRun, stage_keys
@@ -29,7 +31,7 @@ def _table(ran: RunCount, fail: str = "") -> tuple[Stage, ...]:
         def run(context: StageContext) -> object:
             ran[name] += 1
             if name == fail:
-                raise RouteError(f"{name} does not work out")
+                raise AuditError(f"{name} does not work out")
             return work(context)
 
         return run
@@ -100,13 +102,56 @@ def test_damaged_stage_is_computed_again(tmp_path: Path) -> None:
 
 def test_failure_is_recorded_and_forgotten_when_mended(tmp_path: Path) -> None:
     ran: RunCount = Counter()
-    with pytest.raises(RouteError):
+    with pytest.raises(AuditError):
         _run(tmp_path, ran, fail="export")
     layout = OutputLayout(tmp_path, "train", 7, 0)
     assert json.loads(layout.failure_file.read_text()) == {"stage": "export", "reason": "export does not work out"}
     _run(tmp_path, ran)
     assert not layout.failure_file.exists()
     assert ran["room"] == 1
+
+
+def _drawn_until(good: int, tried: list[int]) -> tuple[Stage, ...]:
+    """A table whose routes number ``good`` is the first that works out."""
+
+    def routes(context: StageContext) -> object:
+        tried.append(context.seed.redraw)
+        if context.seed.redraw < good:
+            raise RouteError(f"routes {context.seed.redraw} are too close")
+        return (int(context.seed.stream("x").integers(10**6)),)
+
+    room, export, audit = _table(Counter())
+    row = Stage(30, "routes", 1, ("room",), _section("actors"), routes, redraw=lambda rejected, config: rejected)
+    return (room, row, replace(export, needs=("room", "routes")), audit)
+
+
+def test_rejected_draw_is_drawn_again_and_never_tried_twice(tmp_path: Path) -> None:
+    tried: list[int] = []
+    run = partial(RoomRun, Config(), 7, 0, tmp_path, "cpu", lambda event: None, _drawn_until(2, tried))
+    run().run("routes")
+    run().run("audit")
+    assert tried == [0, 1, 2]
+    shutil.rmtree(tmp_path / ".work")
+    run().run("audit")
+    assert tried == [0, 1, 2]
+    audit = json.loads((tmp_path / "train" / "seed7-room0000" / "audit.json").read_text())
+    assert audit["rejected_draws"] == 2
+
+
+def test_draws_end_with_the_last_reason(tmp_path: Path) -> None:
+    tried: list[int] = []
+    config = Config.model_validate({"redraw": {"routes_per_room": 1, "rooms": 1}})
+    for _ in range(2):
+        with pytest.raises(RouteError, match="routes 3 are too close"):
+            RoomRun(config, 7, 0, tmp_path, "cpu", lambda event: None, _drawn_until(9, tried)).run("audit")
+    assert tried == [0, 1, 2, 3, 3]
+
+
+def test_room_is_drawn_anew_when_its_routes_are_spent() -> None:
+    config = Config.model_validate({"redraw": {"routes_per_room": 1}})
+    keys = [stage_keys(config, 7, 0, rejected) for rejected in range(3)]
+    assert keys[0]["room"] == keys[1]["room"] != keys[2]["room"]
+    assert len({key["routes"] for key in keys}) == 3
 
 
 def test_room_does_not_depend_on_the_others(tmp_path: Path) -> None:
