@@ -44,6 +44,8 @@ LAMPS = frozenset({"EMISSION"})
 # Small things are looked at from closer by: their texels are denser.
 SMALL_M2, SMALL_BOOST = 0.5, 1.5
 MARGIN_PX = 3
+# What packing leaves of an image for charts, about.
+PACKED_SHARE = 0.87
 
 
 @dataclass(frozen=True)
@@ -240,7 +242,8 @@ def bake_all(worker: Worker, max_texels: int) -> None:
     works = collect()
     if not works:
         return
-    texels_per_m = atlas.shared_density([work.charts for work in works], [work.boost for work in works], max_texels)
+    budget = round(PACKED_SHARE * max_texels)
+    texels_per_m = atlas.shared_density([work.charts for work in works], [work.boost for work in works], budget)
     scene = bpy.context.scene
     world, scene.world = scene.world, None
     hidden = isolate(list(scene.objects))
