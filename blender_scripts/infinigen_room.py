@@ -36,7 +36,7 @@ from plain_meshes import (
 STRUCTURE = frozenset({"floor", "wall", "ceiling"})
 # Detail an object keeps: triangles per metre of its diagonal, within limits.
 TRIANGLES_PER_M = 10_000
-MIN_TRIANGLES, MAX_TRIANGLES = 2_000, 40_000
+MIN_TRIANGLES, MAX_TRIANGLES = 1_000, 40_000
 # Direct sun beyond this (W/m2) leaves white patches in a picture that shows the room.
 MAX_SUN_W_M2 = 8.0
 # Lamp power per square metre of floor: below the first a room is dim; a ceiling panel then brings it to the second.
@@ -73,8 +73,7 @@ def _keep_only(result: infinigen_rooms.RoomResult) -> list[bpy.types.Object]:
     kept = {thing.name for thing in things} | {lamp.item().name for lamp in result.lights}
     bpy.context.view_layer.update()
     unparent([thing for thing in bpy.data.objects if thing.name in kept])
-    for thing in [thing for thing in bpy.data.objects if thing.name not in kept]:
-        bpy.data.objects.remove(thing)
+    bpy.data.batch_remove([thing for thing in bpy.data.objects if thing.name not in kept])
     for thing in things:
         thing.hide_render = thing.hide_viewport = False
     bpy.context.view_layer.update()
@@ -89,9 +88,9 @@ def _make_plain(things: list[bpy.types.Object], categories: list[str]) -> None:
     for thing, category in zip(things, categories, strict=True):
         if category in GLAZED:
             cut_panes(thing.data)
-        # Leaves are single faces: collapsing them leaves bare stalks.
-        if category != "plant":
-            thin_out(thing, _triangle_budget(thing))
+    # Leaves are single faces: collapsing them leaves bare stalks.
+    solid = [thing for thing, category in zip(things, categories, strict=True) if category != "plant"]
+    thin_out(solid, [_triangle_budget(thing) for thing in solid])
     for material in bpy.data.materials:
         if material.use_nodes:
             make_opaque(material)

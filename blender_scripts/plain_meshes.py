@@ -19,52 +19,57 @@ def cap_subdivision(thing: bpy.types.Object, max_level: int, max_triangles: int)
             while level > 0 and 2 * faces * 4**level > max_triangles:
                 level -= 1
             modifier.levels = modifier.render_levels = level
+        # Applying evaluates what the viewport shows, and it shall see what is rendered.
+        modifier.show_viewport = modifier.show_render
 
 
 def apply_modifiers(things: list[bpy.types.Object]) -> None:
     """Gives every object the mesh it renders as, without modifiers; equal objects share one mesh."""
+    keys = [_sharing_key(thing) for thing in things]
+    first = dict(zip(reversed(keys), reversed(things), strict=True))
+    for key, thing in zip(keys, things, strict=True):
+        if first[key] is not thing:
+            # Evaluating each copy would take memory for all of them at once.
+            thing.modifiers.clear()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    shared: dict[tuple, bpy.types.Mesh] = {}
-    applied = []
-    for thing in things:
-        key = _sharing_key(thing)
-        mesh = None if key is None else shared.get(key)
-        if mesh is None:
-            mesh = bpy.data.meshes.new_from_object(
-                thing.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
-            )
-            if key is not None:
-                shared[key] = mesh
-        applied.append(mesh)
-    for thing, mesh in zip(things, applied, strict=True):
+    meshes = {
+        key: bpy.data.meshes.new_from_object(
+            thing.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
+        )
+        for key, thing in first.items()
+    }
+    for key, thing in zip(keys, things, strict=True):
         thing.modifiers.clear()
-        thing.data = mesh
+        thing.data = meshes[key]
 
 
-def _sharing_key(thing: bpy.types.Object) -> tuple | None:
-    """Equal for objects that evaluate to the same mesh; None where that cannot be told."""
+def _sharing_key(thing: bpy.types.Object) -> tuple:
+    """Equal for objects that evaluate to the same mesh, as far as can be told."""
     if any(modifier.type != "SUBSURF" for modifier in thing.modifiers):
-        return None
+        return (thing.name,)
     materials = tuple(slot.material.name if slot.material is not None else "" for slot in thing.material_slots)
     levels = tuple(modifier.render_levels for modifier in thing.modifiers)
     return thing.data.name, materials, levels
 
 
-def thin_out(thing: bpy.types.Object, max_triangles: int) -> None:
-    """Collapses edges of a mesh that has more than ``max_triangles``; all objects that share it change alike."""
-    mesh = thing.data
-    triangles = sum(len(face.vertices) - 2 for face in mesh.polygons)
-    if triangles <= max_triangles:
-        return
-    modifier = thing.modifiers.new("thin_out", "DECIMATE")
-    modifier.ratio = max_triangles / triangles
+def thin_out(things: list[bpy.types.Object], max_triangles: list[int]) -> None:
+    """Collapses edges of meshes that have more triangles than allowed; objects that share a mesh change alike."""
+    heavy: dict[str, bpy.types.Object] = {}
+    for thing, limit in zip(things, max_triangles, strict=True):
+        triangles = sum(len(face.vertices) - 2 for face in thing.data.polygons)
+        if triangles > limit and thing.data.name not in heavy:
+            thing.modifiers.new("thin_out", "DECIMATE").ratio = limit / triangles
+            heavy[thing.data.name] = thing
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    thinner = bpy.data.meshes.new_from_object(
-        thing.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
-    )
-    thing.modifiers.clear()
-    mesh.user_remap(thinner)
-    bpy.data.meshes.remove(mesh)
+    thinner = [
+        bpy.data.meshes.new_from_object(
+            thing.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
+        )
+        for thing in heavy.values()
+    ]
+    for thing, mesh in zip(heavy.values(), thinner, strict=True):
+        thing.modifiers.clear()
+        thing.data.user_remap(mesh)
 
 
 def unparent(things: list[bpy.types.Object]) -> None:
