@@ -104,23 +104,41 @@ def _sweep(position_m: Float64[np.ndarray, "T 3"]) -> _Sweep:
 
 
 def _actor_distance_m(swept: _Sweep, actor: ActorMesh) -> float:
-    """Least distance to an actor's triangles over all sub-steps."""
+    """Least distance to an actor's triangles over all sub-steps.
+
+    The distance changes by no more than camera and vertices move, and the mesh lies within its box: sub-steps are
+    measured in the order of what they could still be, until none can be nearer than the nearest measured.
+    """
+    could_be_m = _box_distance_m(swept, actor)
+    moved_m = _motion_m(swept, actor)
+    faces = actor.faces
+    nearest_m = np.inf
+    while could_be_m.min() < nearest_m:
+        step = int(could_be_m.argmin())
+        frame, share = swept.frame[step], swept.share[step]
+        start_m, end_m = actor.vertices_m[frame : frame + 2].astype(np.float64)
+        distance_m = _mesh_distance_m(swept.position_m[step], (1.0 - share) * start_m + share * end_m, faces)
+        nearest_m = min(nearest_m, distance_m)
+        could_be_m = np.maximum(could_be_m, distance_m - np.abs(moved_m - moved_m[step]))
+        could_be_m[step] = np.inf
+    return nearest_m
+
+
+def _box_distance_m(swept: _Sweep, actor: ActorMesh) -> Float64[np.ndarray, " N"]:
     low_m, high_m = actor.vertices_m.min(axis=1), actor.vertices_m.max(axis=1)
     low_m = np.minimum(low_m[swept.frame], low_m[swept.frame + 1])
     high_m = np.maximum(high_m[swept.frame], high_m[swept.frame + 1])
-    beyond = np.maximum(np.maximum(low_m - swept.position_m, swept.position_m - high_m), 0.0)
-    box_m = np.linalg.norm(beyond, axis=1)
-    faces = actor.faces
-    nearest_m = np.inf
-    for step in np.argsort(box_m, kind="stable"):
-        # The mesh lies within its box: no later sub-step can come nearer.
-        if box_m[step] >= nearest_m:
-            break
-        frame, share = swept.frame[step], swept.share[step]
-        start_m, end_m = actor.vertices_m[frame : frame + 2].astype(np.float64)
-        vertices_m = (1.0 - share) * start_m + share * end_m
-        nearest_m = min(nearest_m, _mesh_distance_m(swept.position_m[step], vertices_m, faces))
-    return nearest_m
+    beyond_m = np.maximum(np.maximum(low_m - swept.position_m, swept.position_m - high_m), 0.0)
+    return np.asarray(np.linalg.norm(beyond_m, axis=1))
+
+
+def _motion_m(swept: _Sweep, actor: ActorMesh) -> Float64[np.ndarray, " N"]:
+    """How far the camera and the actor's fastest vertex have moved together since the start."""
+    fastest_m = np.linalg.norm(np.diff(actor.vertices_m, axis=0), axis=2).max(axis=1)
+    camera_m = np.linalg.norm(np.diff(swept.position_m, axis=0), axis=1)
+    actor_m = np.concatenate([[0.0], np.cumsum(fastest_m, dtype=np.float64)])
+    actor_m = actor_m[swept.frame] + swept.share * fastest_m[swept.frame]
+    return np.asarray(np.concatenate([[0.0], np.cumsum(camera_m)]) + actor_m)
 
 
 def _mesh_distance_m(

@@ -7,7 +7,7 @@ from jaxtyping import Float64
 
 from perpetua.cameras.audit import CameraAudit, audit_paths
 from perpetua.cameras.config import CamerasConfig
-from perpetua.geometry.mesh import join
+from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.raycast import Caster
 
 FRAMES, FPS = 12, 12.0
@@ -69,6 +69,19 @@ def test_too_near_an_actor() -> None:
     assert _only_rule(audit) == "actor"
     # A capsule of ten segments lies up to 1 - cos(18 degrees) of its radius inside the round one.
     assert 0.25 - 1e-6 <= audit.actor_distance_m[0] < 0.262
+
+
+def test_distance_to_an_actor_is_the_least_of_all_sub_steps() -> None:
+    """Camera and actor pass each other; the nearest moment lies between frames."""
+    camera_m = _line(np.array([-2.0, 1.7, 1.4]), np.array([-0.8, 1.5, 1.4]))
+    walk_m = _line(np.array([-0.9, 0.9, 0.0]), np.array([-1.9, 0.8, 0.0]))
+    actor = walker(0, walk_m[:, :2])
+    focus = np.ones((1, FRAMES, 1), bool)
+    audit = audit_paths((camera_path(camera_m, TARGET_M),), focus, ROOM, (actor,), CASTER, FPS, CamerasConfig())
+    share = np.linspace(0.0, 1.0, 8 * (FRAMES - 1) + 1)[:, None]
+    between_m = (1.0 - share) * (camera_m[0] - walk_m[0]) + share * (camera_m[-1] - walk_m[-1])
+    still = Caster(TriMesh(walker(0, np.zeros((1, 2))).vertices_m[0].astype(np.float64), actor.faces))
+    assert audit.actor_distance_m[0] == pytest.approx(still.closest_distance(between_m).min(), abs=1e-4)
 
 
 def test_outside_of_the_room() -> None:
