@@ -18,7 +18,7 @@ from perpetua.actors.types import ActorPart
 from perpetua.rooms.types import Material
 
 _BODY_VERTICES = 13380
-_ROWS = 6
+_SHORT_ROWS, _LONG_ROWS = 6, 11
 _LONG_M = 0.12
 _LIE = np.array([0.0, 0.0, -0.15])
 _FALL = np.array([0.0, 0.0, -1.0])
@@ -54,8 +54,8 @@ STYLES = {
     "short": HairStyle("short", 230, 0.040, 0.045, 0.019, 0.10, 0.5, 0.0, 0.010, 0.002, 0.002, 0.0),
     "side-parted": HairStyle("side-parted", 230, 0.050, 0.080, 0.020, 0.08, 0.0, 0.9, 0.012, 0.002, 0.002, 0.0),
     "swept-back": HairStyle("swept-back", 230, 0.055, 0.085, 0.019, 0.10, -1.4, 0.0, 0.014, 0.002, 0.003, 0.003),
-    "chin-length": HairStyle("chin-length", 260, 0.200, 0.215, 0.024, 0.0, 0.0, 1.0, 0.014, 0.002, 0.002, 0.0),
-    "long": HairStyle("long", 250, 0.330, 0.345, 0.026, 0.0, -0.3, 1.0, 0.013, 0.002, 0.006, 0.0),
+    "chin-length": HairStyle("chin-length", 190, 0.200, 0.215, 0.028, 0.0, 0.0, 1.0, 0.014, 0.002, 0.002, 0.0),
+    "long": HairStyle("long", 190, 0.330, 0.345, 0.030, 0.0, -0.3, 1.0, 0.013, 0.002, 0.006, 0.0),
     "curly": HairStyle("curly", 300, 0.055, 0.055, 0.022, 0.30, 0.2, 0.0, 0.020, 0.006, 0.010, 0.0),
     "afro": HairStyle("afro", 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.045, 0.005, 0.0, 0.002),
     "tied-up": HairStyle("tied-up", 0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.012, 0.001, 0.0, 0.0),
@@ -188,14 +188,15 @@ def _grow(
     clearance_m = style.cap_m * rng.uniform(0.6, 1.15, len(length)) + 0.003
     wave = rng.uniform(0.0, 2.0 * np.pi, len(length))
     spine, normals, held = [root_m - 0.004 * normal], [normal], np.ones(len(length), dtype=bool)
-    for row in range(1, _ROWS):
+    rows = _LONG_ROWS if style.length_m > _LONG_M else _SHORT_ROWS
+    for row in range(1, rows):
         # On the scalp locks keep their direction; beyond it they fall.
         heading = np.where(held[:, None], heading + _LIE, 0.35 * heading + _FALL)
         heading -= 0.9 * np.minimum(np.sum(heading * normals[-1], axis=1, keepdims=True), 0.0) * normals[-1]
         heading /= np.linalg.norm(heading, axis=1, keepdims=True)
-        place = spine[-1] + heading * (length / (_ROWS - 1))[:, None]
+        place = spine[-1] + heading * (length / (rows - 1))[:, None]
         place += style.curl_m * np.sin(1.9 * row + wave)[:, None] * np.cross(heading, normals[-1])
-        rise_m = clearance_m + style.lift * length * (row / (_ROWS - 1)) ** 1.5
+        rise_m = clearance_m + style.lift * length * (row / (rows - 1)) ** 1.5
         place, outward, held = _settle(place, skull, rise_m, style)
         heading = place - spine[-1]
         heading /= np.maximum(np.linalg.norm(heading, axis=1, keepdims=True), 1e-6)

@@ -93,7 +93,7 @@ def _denim(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> np.
     yarn = rng.normal(0.0, 0.045, SIZE_PX)[None, :] + 0.05 * tileable_noise(rng, SIZE_PX, 60, 2)
     fade = 0.018 * tileable_noise(rng, SIZE_PX, 3, 3)
     share = np.clip(0.08 + 0.20 * twill + yarn + fade, 0.0, 1.0)
-    return _mix(base, np.full(3, 0.62), share)
+    return _mix(base, np.array([0.30, 0.40, 0.56]), share)
 
 
 def _knit(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> np.ndarray:

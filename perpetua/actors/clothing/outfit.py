@@ -65,9 +65,9 @@ _TOP_FABRICS: dict[str, tuple[str, ...]] = {
     "long-sleeved top": ("stripes", "heather", "print"),
 }
 _BOTTOMS: dict[str, TrouserPattern | SkirtPattern] = {
-    "jeans": TrouserPattern(0.125, 0.800, 0.008, 0.015, 0.003),
-    "slim trousers": TrouserPattern(0.130, 0.785, 0.007, 0.011, 0.003),
-    "loose trousers": TrouserPattern(0.130, 0.800, 0.011, 0.026, 0.003),
+    "jeans": TrouserPattern(0.125, 0.812, 0.008, 0.015, 0.003),
+    "slim trousers": TrouserPattern(0.130, 0.795, 0.007, 0.011, 0.003),
+    "loose trousers": TrouserPattern(0.130, 0.812, 0.011, 0.026, 0.003),
     "shorts": TrouserPattern(0.125, 0.375, 0.011, 0.026, 0.003),
     "skirt": SkirtPattern(0.090, -0.380, 0.003, 0.003),
 }

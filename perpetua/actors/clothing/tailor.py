@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float64
+from scipy.spatial import cKDTree
 
 from perpetua.actors.bodies.rig import joint_index
 from perpetua.actors.clothing.collar import collar
@@ -33,18 +34,22 @@ _SKIRT_RADIUS_M = 0.19
 _TUCKED_M = 0.025
 
 
+# Cuffs do not turn with the hand, and a hem hangs from the waist more than it follows the thighs.
+_TOP_MOVES = {"wrist": ("forearm", 0.9), "hip": ("pelvis", 0.5)}
+
+
 def _material(name: str, fabric: Fabric) -> Material:
     return Material(name=name, base_color=(0.5, 0.5, 0.5), roughness=fabric.roughness, image=fabric.image)
 
 
 def _onto(weights: Float64[np.ndarray, "P J"], moves: dict[str, tuple[str, float]]) -> Float64[np.ndarray, "P J"]:
-    """Moves a share of one joint's weight to another joint, on both sides."""
+    """Moves a share of one joint's weight to another joint of its side, or to the pelvis."""
     moved = weights.copy()
     for source, (goal, share) in moves.items():
         for side in ("left", "right"):
             part = share * moved[:, joint_index(f"{side}_{source}")]
             moved[:, joint_index(f"{side}_{source}")] -= part
-            moved[:, joint_index(f"{side}_{goal}")] += part
+            moved[:, joint_index(goal if goal == "pelvis" else f"{side}_{goal}")] += part
     return moved
 
 
@@ -97,7 +102,7 @@ def sew_top(wearer: Wearer, pattern: TopPattern, fabric: Fabric, rng: np.random.
     cloth_m = draped(seamed, ease_m, Drape(gap_m=gap_m, passes=40, hold=hold))
     depth_m = 0.28 * ease_m * np.clip(field_m / 0.05, 0.0, 1.0)
     folded = _folded(replace(seamed, vertices_m=cloth_m), depth_m, (0.2, 0.3, 0.9), rng)
-    outside = replace(folded, weights=_onto(_eased_weights(seamed, 6), {"wrist": ("forearm", 0.9)}))
+    outside = replace(folded, weights=_onto(_eased_weights(seamed, 6), _TOP_MOVES))
     sewn = hemmed(outside, field_m, _HEM_M, pattern.thickness_m)
     on_arm = arm_share(_template_weights(sewn, seamed))[sewn.faces].mean(axis=1) > 0.5
     uv = trunk(sewn)
@@ -122,9 +127,9 @@ def sew_trousers(
     field_m = _edged(seamed, trouser_field_m(pattern, seamed.template_m, seamed.weights))
     hip, leg = pattern.hip_ease_m, pattern.leg_ease_m
     below = along_leg_m(seamed.template_m)
-    ease_m = np.interp(below, [-0.1, 0.05, 0.3, 0.55, 0.8], [0.5 * hip, hip, 0.8 * leg, leg, 1.1 * leg])
+    ease_m = np.interp(below, [-0.1, 0.05, 0.3, 0.55, 0.8], [0.5 * hip, hip, 0.8 * leg, leg, 0.7 * leg])
     cloth_m = draped(seamed, ease_m, Drape(np.full(len(ease_m), 0.4 * hip), passes=60, hold=np.full(len(ease_m), 0.04)))
-    depth_m = np.interp(below, [0.0, 0.2, 0.4, 0.55, 0.7, 0.8], [0.002, 0.001, 0.004, 0.0015, 0.004, 0.005])
+    depth_m = np.interp(below, [0.0, 0.2, 0.4, 0.55, 0.7, 0.8], [0.002, 0.001, 0.004, 0.0015, 0.004, 0.003])
     depth_m *= np.clip(field_m / 0.04, 0.0, 1.0) * leg / 0.02
     folded = _folded(replace(seamed, vertices_m=cloth_m), depth_m, (0.25, 0.15, 0.9), rng)
     weights = _onto(_eased_weights(seamed, 6), {"foot": ("ankle", 1.0), "ankle": ("knee", 0.75)})
@@ -148,7 +153,7 @@ def sew_skirt(
     cut, _ = positive(helper, skirt_field_m(pattern, helper.template_m, helper.weights))
     field_m = _edged(cut, skirt_field_m(pattern, cut.template_m, cut.weights))
     outward = smooth_normals(cut)
-    eased_m = cut.vertices_m + (pattern.hip_ease_m * outward)
+    eased_m = _fitted(wearer, cut) + pattern.hip_ease_m * outward
     depth_m = np.interp(cut.template_m[:, 2], [pattern.hem_z_m, 0.0, 0.1], [0.010, 0.003, 0.0])
     folded = _folded(replace(cut, vertices_m=eased_m), depth_m, (0.5, 0.8, 0.0), rng)
     sewn = hemmed(replace(folded, weights=_skirt_weights(cut)), field_m, _HEM_M, pattern.thickness_m)
@@ -162,6 +167,16 @@ def sew_skirt(
         _SKIRT_RADIUS_M,
     )
     return _under(top, sewn, uv, fabric, "skirt")
+
+
+def _fitted(wearer: Wearer, skirt: Surface) -> Float64[np.ndarray, "P 3"]:
+    """The skirt drawn in to the hips above the thighs, where the top goes over it."""
+    tights = refined_group(wearer, "helper-tights")
+    normal = smooth_normals(tights)
+    _, near = cKDTree(tights.vertices_m).query(skirt.vertices_m)
+    gap_m = np.einsum("pa,pa->p", skirt.vertices_m - tights.vertices_m[near], normal[near])
+    allowed_m = np.interp(skirt.template_m[:, 2], [-0.14, -0.02], [0.20, 0.001])
+    return np.asarray(skirt.vertices_m - np.maximum(gap_m - allowed_m, 0.0)[:, None] * normal[near])
 
 
 def _skirt_weights(surface: Surface) -> Float64[np.ndarray, "P J"]:
