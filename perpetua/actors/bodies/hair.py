@@ -164,7 +164,7 @@ def _settle(
     template_m = skull.template_m[near]
     curtain = style.length_m > _LONG_M
     face = curtain & (template_m[:, 0] > 0.07) & (template_m[:, 2] < 0.775) & (template_m[:, 2] > 0.58)
-    aside = np.where(face, np.maximum(0.080 - np.abs(template_m[:, 1]), 0.0), 0.0)
+    aside = np.where(face, np.maximum(0.070 - np.abs(template_m[:, 1]), 0.0), 0.0)
     place = place + (np.sign(place[:, 1]) * aside)[:, None] * np.array([0.0, 1.0, 0.0])
     _, near = skull.tree.query(place)
     gap = np.sum((place - skull.places_m[near]) * skull.normals[near], axis=1)
