@@ -1,6 +1,5 @@
 """Checks of the machine: Python, the system libraries bpy links, packages, disk, devices, optional assets."""
 
-import ctypes
 import importlib.metadata
 import platform
 import shutil
@@ -11,20 +10,8 @@ from pathlib import Path
 from typing import Literal
 
 from perpetua.assets import load_manifest
-from perpetua.errors import EnvironmentSetupError
+from perpetua.system_libraries import missing_libraries
 
-# The libraries that bpy 4.2 links and its wheel does not bring: file -> Debian and Ubuntu package.
-SYSTEM_LIBRARIES = {
-    "libGL.so.1": "libgl1",
-    "libXi.so.6": "libxi6",
-    "libXrender.so.1": "libxrender1",
-    "libXxf86vm.so.1": "libxxf86vm1",
-    "libXfixes.so.3": "libxfixes3",
-    "libxkbcommon.so.0": "libxkbcommon0",
-    "libSM.so.6": "libsm6",
-    "libICE.so.6": "libice6",
-    "libgomp.so.1": "libgomp1",
-}
 NEEDED_PACKAGES = ("bpy", "numpy", "scipy", "torch", "trimesh", "anny", "opencv-python-headless", "OpenEXR")
 WANTED_DISK_GB = 5.0
 
@@ -44,31 +31,6 @@ class Finding:
 def examine(out: Path) -> list[Finding]:
     """Looks at everything; nothing is changed."""
     return [*_python(), *_libraries(), *_packages(), *_disk(out), *_devices(), *_assets()]
-
-
-def missing_libraries() -> list[str]:
-    """Debian names of the system libraries that bpy needs and the loader does not find."""
-    if platform.system() != "Linux":
-        return []
-    return [package for library, package in SYSTEM_LIBRARIES.items() if not _loads(library)]
-
-
-def require_libraries() -> None:
-    """Raises EnvironmentSetupError with the command to run if a system library of bpy is missing."""
-    missing = missing_libraries()
-    if missing:
-        raise EnvironmentSetupError(
-            f"Blender needs system libraries that are not installed: {', '.join(missing)}; on Debian or Ubuntu run: "
-            f"sudo apt-get install -y {' '.join(missing)}"
-        )
-
-
-def _loads(library: str) -> bool:
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True
 
 
 def _python() -> Iterator[Finding]:

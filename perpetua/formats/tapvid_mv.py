@@ -1,6 +1,5 @@
 """Writer of the benchmark layout; ``perpetua.formats.layout`` lists its files."""
 
-import hashlib
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +10,7 @@ from jaxtyping import Float64
 
 from perpetua.actors.types import ActorMesh
 from perpetua.cameras.types import CameraPath
+from perpetua.files import file_sha256
 from perpetua.formats import layout
 from perpetua.formats.source import EXPORTERS
 from perpetua.geometry.transforms import invert_rigid
@@ -100,7 +100,7 @@ def _write_record(folder: Path, points: PointTracks, record: dict[str, Any]) -> 
             "barycentric": points.barycentric.tolist(),
         },
         "files": {
-            path.relative_to(folder).as_posix(): _sha256(path)
+            path.relative_to(folder).as_posix(): file_sha256(path)
             for path in sorted(folder.rglob("*"))
             if path.is_file() and path.name != layout.RECORD
         },
@@ -119,8 +119,3 @@ def _classes(position_m: Float64[np.ndarray, "T N 3"]) -> list[str]:
         fastest_m[far] = np.maximum(fastest_m[far], apart_m)
     names = np.select([fastest_m > FAST_M, reach_m > MOVING_M, reach_m > 0.0], ["fast", "dynamic", "slow"], "static")
     return [str(name) for name in names]
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as handle:
-        return hashlib.file_digest(handle, "sha256").hexdigest()

@@ -14,7 +14,6 @@ from rich.console import Console
 from perpetua.audit.contact_sheet import write_contact_sheet
 from perpetua.cluster.local import raise_on_sigterm, run_rooms
 from perpetua.config import Config
-from perpetua.doctor import require_libraries
 from perpetua.errors import ConfigError
 from perpetua.pipeline.cost import Cost, check_disk, estimate_cost, gigabytes
 from perpetua.pipeline.events import OnEvent
@@ -22,6 +21,7 @@ from perpetua.pipeline.layout import LOG_FILE, OutputLayout, open_run
 from perpetua.pipeline.progress import Progress
 from perpetua.pipeline.runner import RoomRun
 from perpetua.pipeline.stages import STAGE_NAMES, STAGES
+from perpetua.system_libraries import require_libraries
 
 EXIT_INTERRUPTED = 130
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from perpetua.config import Config
 from perpetua.errors import InputError, PerpetuaError
-from perpetua.pipeline.store import write_json
+from perpetua.files import write_json
 
 WORK_FOLDER = ".work"
 RUN_FILE = "run.json"

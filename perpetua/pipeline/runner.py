@@ -8,12 +8,13 @@ from typing import Any
 
 from perpetua.config import Config
 from perpetua.errors import ActorError, CameraError, PerpetuaError, RouteError, TrackError
+from perpetua.files import read_json, write_json
 from perpetua.pipeline import codec, store
 from perpetua.pipeline.events import Event, OnEvent
 from perpetua.pipeline.layout import OutputLayout
 from perpetua.pipeline.memory import PeakMemory
-from perpetua.pipeline.scripts import scripts_sha256
 from perpetua.pipeline.stages import AUDIT_FILE, SEQUENCE_FOLDER, STAGES, Stage, StageContext
+from perpetua.rendering.scripts import scripts_sha256
 from perpetua.seeding import StageSeed
 
 # Errors that another draw of the routes, or of the room, may not meet.
@@ -80,8 +81,8 @@ class RoomRun:
         return None
 
     def _reject(self, stage: Stage, error: PerpetuaError) -> None:
-        rejections = store.read_json(self.layout.rejections_file) | {self.keys[stage.name]: str(error)}
-        store.write_json(self.layout.rejections_file, rejections)
+        rejections = read_json(self.layout.rejections_file) | {self.keys[stage.name]: str(error)}
+        write_json(self.layout.rejections_file, rejections)
         limits = self.config.redraw
         if self.rejected + 1 >= (limits.routes_per_room + 1) * (limits.rooms + 1):
             self._note_failure(stage, error)
@@ -89,7 +90,7 @@ class RoomRun:
         self._report("message", text=f"draw {self.rejected + 1} rejected by {stage.name}: {error}")
 
     def _note_failure(self, stage: Stage, error: PerpetuaError) -> None:
-        store.write_json(self.layout.failure_file, {"stage": stage.name, "reason": str(error)})
+        write_json(self.layout.failure_file, {"stage": stage.name, "reason": str(error)})
 
     def _run_stage(self, stage: Stage) -> None:
         folder = store.StageFolder(self.layout.work_folder, stage.number, stage.name)
@@ -152,9 +153,9 @@ class RoomRun:
         shutil.rmtree(partial, ignore_errors=True)
         target.parent.mkdir(parents=True, exist_ok=True)
         store.link_tree(self._folder_of("export") / SEQUENCE_FOLDER, partial)
-        audit = store.read_json(self._folder_of("audit") / AUDIT_FILE)
+        audit = read_json(self._folder_of("audit") / AUDIT_FILE)
         last = self.stages[-1].name
-        store.write_json(partial / AUDIT_FILE, {**audit, "key": self.keys[last], "rejected_draws": self.rejected})
+        write_json(partial / AUDIT_FILE, {**audit, "key": self.keys[last], "rejected_draws": self.rejected})
         store.replace_folder(partial, target)
 
     def _report(self, kind: Any, stage: str = "", **details: Any) -> None:
@@ -184,7 +185,7 @@ def stage_keys(
 
 def rejected_draws(layout: OutputLayout, config: Config, stages: tuple[Stage, ...] = STAGES) -> int:
     """How many draws of a room are known to break a hard limit under this config."""
-    rejections = store.read_json(layout.rejections_file)
+    rejections = read_json(layout.rejections_file)
     rejected = 0
     limit = (config.redraw.routes_per_room + 1) * (config.redraw.rooms + 1)
     while rejected + 1 < limit:
@@ -197,7 +198,7 @@ def rejected_draws(layout: OutputLayout, config: Config, stages: tuple[Stage, ..
 
 def published_redraw(layout: OutputLayout, config: Config, stages: tuple[Stage, ...] = STAGES) -> int | None:
     """How many draws were rejected before the published sequence; None if none is published under this config."""
-    audit = store.read_json(layout.sequence_folder / AUDIT_FILE)
+    audit = read_json(layout.sequence_folder / AUDIT_FILE)
     rejected = audit.get("rejected_draws")
     if not isinstance(rejected, int):
         return None

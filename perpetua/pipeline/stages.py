@@ -18,13 +18,14 @@ from perpetua.cameras.plan import plan_cameras
 from perpetua.cameras.types import CameraPath
 from perpetua.config import Config
 from perpetua.errors import AuditError
+from perpetua.files import write_json
 from perpetua.formats import EXPORTERS
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
 from perpetua.pipeline.config import RedrawConfig
 from perpetua.pipeline.record import sequence_record
-from perpetua.pipeline.store import write_json
-from perpetua.rendering.job import FRAME_FOLDER
+from perpetua.rendering.bake import BAKE_SCRIPT
+from perpetua.rendering.job import FRAME_FOLDER, PROCESS_SETTINGS
 from perpetua.rendering.render import RENDER_SCRIPT, render_views
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.source import build_room
@@ -180,6 +181,11 @@ def _cameras(context: StageContext) -> tuple[CameraPath, ...]:
     )
 
 
+def _render_settings(config: Config) -> dict[str, Any]:
+    """What decides the picture: not how many threads work on it, or how long they may take."""
+    return config.render.model_dump(mode="json", exclude=set(PROCESS_SETTINGS))
+
+
 def _render(context: StageContext) -> tuple[RenderedView, ...]:
     return render_views(
         context.one("room", Room),
@@ -263,9 +269,9 @@ STAGES = (
         "render",
         1,
         ("room", "actors", "cameras"),
-        _settings("render"),
+        _render_settings,
         _render,
-        scripts=(RENDER_SCRIPT.name,),
+        scripts=(BAKE_SCRIPT.name, RENDER_SCRIPT.name),
         resumable=True,
         leftovers=(FRAME_FOLDER,),
     ),

@@ -8,10 +8,11 @@ from typing import Any
 
 from rich.table import Table
 
+from perpetua.files import read_json
 from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout, RunRecord, read_run
 from perpetua.pipeline.runner import published_redraw, rejected_draws, stage_keys
 from perpetua.pipeline.stages import STAGES
-from perpetua.pipeline.store import StageFolder, read_json
+from perpetua.pipeline.store import StageFolder
 
 
 @dataclass(frozen=True)

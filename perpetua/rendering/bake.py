@@ -6,9 +6,10 @@ import logging
 from pathlib import Path
 
 from perpetua.errors import RenderError
+from perpetua.files import file_sha256, write_json
 from perpetua.rendering.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.rendering.config import RenderConfig
-from perpetua.rendering.job import file_sha256, scripts_sha256, write_json
+from perpetua.rendering.scripts import scripts_sha256
 from perpetua.rooms.types import Room
 
 logger = logging.getLogger(__name__)
@@ -51,7 +52,7 @@ def bake_room(room: Room, config: RenderConfig, images_ahead: int, work_dir: Pat
     if budget == 0:
         return room.blend_path
     source = room.blend_path.resolve()
-    key = json.dumps([file_sha256(source), scripts_sha256(), budget])
+    key = json.dumps([file_sha256(source), scripts_sha256((BAKE_SCRIPT.name,)), budget])
     baked = work_dir.resolve() / f"baked_{hashlib.sha256(key.encode()).hexdigest()[:24]}.blend"
     if not baked.is_file():
         job_path = work_dir / "bake.json"

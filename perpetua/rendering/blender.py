@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import IO, Any
 
 from perpetua.errors import AssetError, EnvironmentSetupError, StageError
+from perpetua.system_libraries import SYSTEM_LIBRARIES
 
 SCRIPT_FOLDER = Path(__file__).parent.parent.parent / "blender_scripts"
-SYSTEM_LIBRARIES = "libgl1 libxi6 libxrender1 libxxf86vm1 libxfixes3 libxkbcommon0 libsm6 libice6 libgomp1"
 TAIL_LINES = 12
 READ_BYTES = 65536
 
@@ -142,7 +142,7 @@ def _explain_exit(code: int, tail: str) -> StageError | EnvironmentSetupError:
     if "cannot open shared object file" in tail:
         return EnvironmentSetupError(
             "Blender needs a system library that is not installed; on Debian: apt-get install "
-            f"{SYSTEM_LIBRARIES}\n{tail}"
+            f"{' '.join(SYSTEM_LIBRARIES.values())}\n{tail}"
         )
     if code >= 0:
         return BlenderError(f"Blender ended with exit code {code}", tail)

@@ -14,15 +14,17 @@ from jaxtyping import Shaped
 
 from perpetua.actors.types import ActorMesh
 from perpetua.cameras.types import CameraPath
+from perpetua.files import file_sha256, write_json
 from perpetua.rendering.blender import SCRIPT_FOLDER
 from perpetua.rendering.config import RenderConfig
+from perpetua.rendering.scripts import scripts_sha256
 from perpetua.rooms.types import AreaLight, Material, Room, SceneObject
 
+RENDER_SCRIPT = SCRIPT_FOLDER / "render_frames.py"
 JOB_FILE = "job.json"
 PENDING_FILE = "pending.json"
 EXPOSURE_FILE = "exposure.json"
 FRAME_FOLDER = "frames"
-READ_BYTES = 1 << 22
 # Settings of how the work is done, which do not change what comes out.
 PROCESS_SETTINGS = frozenset({"frame_timeout_s", "max_restarts", "blender", "threads"})
 
@@ -44,7 +46,7 @@ def write_job(
     """
     writer = _ArrayWriter(folder)
     job: Settings = {
-        "scripts": scripts_sha256(),
+        "scripts": scripts_sha256((RENDER_SCRIPT.name,)),
         "frames": len(cameras[0].world_from_camera),
         "room": _room_settings(room, writer),
         "actors": [_actor_settings(actor, writer) for actor in actors],
@@ -60,30 +62,6 @@ def write_job(
     job |= {"digest": digest, "blend_path": blend_path, "device": device, "threads": config.threads}
     write_json(path, job)
     return path
-
-
-def write_json(path: Path, content: Settings) -> None:
-    """A JSON file that is there in full or not at all."""
-    temporary = path.with_suffix(".tmp")
-    temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
-    temporary.replace(path)
-
-
-def scripts_sha256() -> str:
-    """SHA-256 over all of Blender's scripts: another script may render another picture."""
-    digest = hashlib.sha256()
-    for path in sorted(SCRIPT_FOLDER.glob("*.py")):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()
-
-
-def file_sha256(path: Path) -> str:
-    """SHA-256 of a file of any size."""
-    digest = hashlib.sha256()
-    with path.open("rb") as stream:
-        while chunk := stream.read(READ_BYTES):
-            digest.update(chunk)
-    return digest.hexdigest()
 
 
 class _ArrayWriter:

@@ -8,18 +8,18 @@ from pathlib import Path
 from perpetua.actors.types import ActorMesh
 from perpetua.cameras.types import CameraPath
 from perpetua.errors import RenderError
+from perpetua.files import write_json
 from perpetua.rendering.bake import bake_room
-from perpetua.rendering.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
+from perpetua.rendering.blender import BlenderError, Event, run_script
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.frames import assemble_view, drop_damaged
-from perpetua.rendering.job import FRAME_FOLDER, PENDING_FILE, write_job, write_json
+from perpetua.rendering.job import FRAME_FOLDER, PENDING_FILE, RENDER_SCRIPT, write_job
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.types import Room
 
 logger = logging.getLogger(__name__)
 
 DEVICES = ("auto", "cpu", "cuda", "optix", "hip", "metal", "oneapi")
-RENDER_SCRIPT = SCRIPT_FOLDER / "render_frames.py"
 MAX_OBJECT_INDEX = 65535
 
 

@@ -9,8 +9,8 @@ from click.testing import CliRunner, Result
 
 import perpetua
 from perpetua.cli import main
-from perpetua.doctor import SYSTEM_LIBRARIES
 from perpetua.pipeline.stages import STAGE_NAMES
+from perpetua.system_libraries import SYSTEM_LIBRARIES
 
 
 def _perpetua(*arguments: str) -> Result:
@@ -106,7 +106,7 @@ def test_assets_lists_licences() -> None:
 
 
 def test_doctor_names_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("perpetua.doctor._loads", lambda library: library != "libXi.so.6")
+    monkeypatch.setattr("perpetua.system_libraries._loads", lambda library: library != "libXi.so.6")
     done = _perpetua("doctor", "--out", str(tmp_path))
     assert done.exit_code == 1
     assert "apt-get install -y libxi6" in " ".join(done.output.split())
