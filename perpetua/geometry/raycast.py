@@ -136,7 +136,8 @@ def _single(values: np.ndarray) -> np.ndarray:
 def _warp_kernel() -> tuple[Any, Any]:
     """Warp, imported at the first distance query, and the kernel of that query."""
     warp: Any = importlib.import_module("warp")
-    warp.config.quiet = True
+    # Its greeting, and its warning where there is no GPU, say nothing about this search, which runs on the CPU.
+    warp.config.log_level = warp.LOG_ERROR
 
     # Warp compiles the function's source; its annotations are Warp's types, not Python's.
     @no_type_check
