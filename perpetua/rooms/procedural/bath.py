@@ -21,7 +21,7 @@ def build_toilet(piece: Piece, palette: Palette) -> list[Part]:
     lid = join(
         [
             post((0.0, bowl_y), radius, 0.40, 0.43, 28),
-            block((-0.85 * half, 0.20, 0.40), (0.85 * half, bowl_y, 0.43), 0.01),
+            block((-0.85 * half, 0.20, 0.401), (0.85 * half, bowl_y, 0.427), 0.01),
         ]
     )
     button = post((0.0, 0.095), 0.025, height, height + 0.008)

@@ -102,9 +102,13 @@ class Layout:
     def around(
         self, anchor: Piece, category: str, size_m: Size, x_m: float, y_m: float, quarters: int, gap_m: float = 0.02
     ) -> Piece | None:
-        """A piece at a place of another's own frame, turned relative to it; None if it does not fit."""
+        """A piece at a place of another's own frame, turned relative to it; None if it does not fit.
+
+        It shares the other's details, so that all that stands around one thing makes a set.
+        """
         x, y = anchor.to_world(x_m, y_m)
-        candidate = self.piece(category, size_m, (x, y, 0.0), anchor.quarters + quarters)
+        position_m = (x, y, 0.0)
+        candidate = Piece(category, size_m, position_m, (anchor.quarters + quarters) % 4, anchor.detail)
         return self.add(candidate) if self.fits(candidate, gap_m=gap_m) else None
 
     def free_standing(self, category: str, size_m: Size, around_m: float) -> Piece | None:

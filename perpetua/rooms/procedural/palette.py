@@ -80,7 +80,7 @@ def sample_palette(rng: np.random.Generator, kind: str) -> Palette:
         leaf=Material("leaf", (0.045, 0.16, 0.03), (0.08, 0.24, 0.05), 0.5, pattern="stripes", scale_m=0.04),
         soil=Material("soil", (0.05, 0.03, 0.02), roughness=1.0),
         lamp_shade=Material("lamp shade", (0.85, 0.78, 0.62), roughness=0.9, emission_w_m2=6.0),
-        accents=tuple(_accent(f"accent {index}", hue, rng) for index in range(5)),
+        accents=tuple(_accent(f"accent {index}", hue + 0.2 * index, rng) for index in range(5)),
         pictures=tuple(_picture(f"picture {index}", rng) for index in range(4)),
     )
 
@@ -104,8 +104,6 @@ def _wall(kind: str, plain: Color, rng: np.random.Generator) -> Material:
     if kind == "bathroom":
         tile_m = float(rng.choice([0.15, 0.2, 0.3]))
         return Material("wall tiles", _shade(plain, 1.1), _shade(plain, 0.75), 0.2, pattern="tile", scale_m=tile_m)
-    if kind in ("bedroom", "livingroom", "diningroom") and rng.uniform() < 0.3:
-        return Material("wallpaper", plain, _shade(plain, 0.88), 0.8, pattern="stripes", scale_m=0.16)
     return Material("wall plaster", plain, _shade(plain, 0.94), 0.9, pattern="plaster", scale_m=0.4)
 
 
@@ -125,7 +123,7 @@ def _rug(color: Color, rng: np.random.Generator) -> Material:
 
 
 def _accent(name: str, hue: float, rng: np.random.Generator) -> Material:
-    color = _color(hue + rng.uniform(0.2, 0.8), rng.uniform(0.4, 0.85), rng.uniform(0.2, 0.7))
+    color = _color(hue + rng.uniform(-0.07, 0.07), rng.uniform(0.35, 0.85), rng.uniform(0.2, 0.7))
     return Material(name, color, roughness=float(rng.uniform(0.2, 0.8)))
 
 
