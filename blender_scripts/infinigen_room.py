@@ -11,7 +11,6 @@ World: Z up, metres, origin on the floor under the middle of the room.
 """
 
 import json
-import sys
 from pathlib import Path
 
 import bpy
@@ -32,6 +31,7 @@ from plain_meshes import (
     unparent,
     world_triangles,
 )
+from worker_link import Worker, read_job
 
 STRUCTURE = frozenset({"floor", "wall", "ceiling"})
 # Detail an object keeps: triangles per metre of its diagonal, within limits.
@@ -45,7 +45,7 @@ MIN_LAMP_W_M2, PANEL_LAMP_W_M2 = 1.2, 2.2
 
 def main() -> None:
     """Makes the room of the job named on the command line."""
-    job = json.loads(Path(sys.argv[-1]).read_text(encoding="utf-8"))
+    job = read_job(Worker().job_path())
     folder = Path(job["folder"])
     result = _generate(job["kind"], job["seed"], job["dimensions_m"])
     things = _keep_only(result)

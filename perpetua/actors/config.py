@@ -27,7 +27,7 @@ class RoutesConfig(Section):
     max_speed_mps: float = Field(2.0, gt=0.0, le=6.0, description="hard limit of speed, m/s")
     max_acceleration_mps2: float = Field(4.0, gt=0.0, le=20.0, description="hard limit of acceleration, m/s^2")
     max_turn_rate_radps: float = Field(2.6, gt=0.2, le=10.0, description="hard limit of the turn rate, rad/s")
-    separation_m: float = Field(0.6, ge=0.2, le=3.0, description="least distance between two body axes, metres")
+    separation_m: float = Field(0.75, ge=0.2, le=3.0, description="least distance between two body axes, metres")
     stop_share: float = Field(0.25, ge=0.0, le=1.0, description="share of places walked to at which an actor stops")
     learning_rate: float = Field(0.02, gt=0.0, le=1.0, description="Adam's first step size, metres and radians")
     steps: int = Field(400, ge=10, le=10000, description="Adam steps")

@@ -24,9 +24,7 @@ def join(meshes: list[TriMesh]) -> TriMesh:
     return TriMesh(vertices_m, faces.astype(np.int32))
 
 
-def face_areas_m2(
-    vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray, "F 3"]
-) -> Float64[np.ndarray, " F"]:
+def face_areas_m2(vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
     """Area of each triangle."""
     corners = vertices_m[faces].astype(np.float64)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

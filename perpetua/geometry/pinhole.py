@@ -24,9 +24,7 @@ class Intrinsics:
         return cls(focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1), width_px, height_px)
 
 
-def project(
-    camera: Intrinsics, points_camera_m: Float64[np.ndarray, "*batch 3"]
-) -> Float64[np.ndarray, "*batch 2"]:
+def project(camera: Intrinsics, points_camera_m: Float64[np.ndarray, "*batch 3"]) -> Float64[np.ndarray, "*batch 2"]:
     """Pixel of points in camera coordinates; NaN where Z <= 0."""
     z = points_camera_m[..., 2]
     safe_z = np.where(z > 0, z, np.nan)

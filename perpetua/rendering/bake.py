@@ -5,9 +5,9 @@ import json
 import logging
 from pathlib import Path
 
+from perpetua.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.errors import RenderError
 from perpetua.files import file_sha256, write_json
-from perpetua.rendering.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.scripts import scripts_sha256
 from perpetua.rooms.types import Room

@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Shaped
 
 from perpetua.actors.types import ActorMesh
+from perpetua.blender import SCRIPT_FOLDER
 from perpetua.cameras.types import CameraPath
 from perpetua.files import file_sha256, write_json
-from perpetua.rendering.blender import SCRIPT_FOLDER
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.scripts import scripts_sha256
 from perpetua.rooms.types import AreaLight, Material, Room, SceneObject

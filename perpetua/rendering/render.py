@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from perpetua.actors.types import ActorMesh
+from perpetua.blender import BlenderError, Event, run_script
 from perpetua.cameras.types import CameraPath
 from perpetua.errors import RenderError
 from perpetua.files import write_json
 from perpetua.rendering.bake import bake_room
-from perpetua.rendering.blender import BlenderError, Event, run_script
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.frames import assemble_view, drop_damaged
 from perpetua.rendering.job import FRAME_FOLDER, PENDING_FILE, RENDER_SCRIPT, write_job

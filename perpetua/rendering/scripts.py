@@ -4,7 +4,7 @@ import ast
 import hashlib
 from pathlib import Path
 
-from perpetua.rendering.blender import SCRIPT_FOLDER
+from perpetua.blender import SCRIPT_FOLDER
 
 
 def script_files(entry: str, folder: Path = SCRIPT_FOLDER) -> list[Path]:

@@ -2,16 +2,13 @@
 
 import importlib.util
 import json
-import os
 import shutil
-import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from perpetua.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.errors import EnvironmentSetupError
 from perpetua.geometry.mesh import TriMesh
 from perpetua.rooms.acceptance import RoomRejected
@@ -20,8 +17,7 @@ from perpetua.rooms.source import ROOM_SOURCES
 from perpetua.rooms.types import Room, SceneObject
 from perpetua.seeding import StageSeed
 
-SCRIPT = Path(__file__).parent.parent.parent / "blender_scripts" / "infinigen_room.py"
-STDERR_LINES = 8
+SCRIPT = SCRIPT_FOLDER / "infinigen_room.py"
 
 
 @ROOM_SOURCES.register("infinigen")
@@ -105,30 +101,13 @@ def _scene_object(entry: dict[str, Any], mesh: TriMesh) -> SceneObject:
 
 
 def _run_script(folder: Path, timeout_s: float) -> None:
-    """Runs the script in its own process group, so that nothing of it outlives this call."""
-    resources = folder / "blender"
-    resources.mkdir()
-    environment = os.environ | {"BLENDER_USER_RESOURCES": str(resources), "PYTHONHASHSEED": "0"}
-    command = [sys.executable, str(SCRIPT), str(folder / "job.json")]
-    with subprocess.Popen(
-        command,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-        start_new_session=True,
-    ) as process:
-        try:
-            _, stderr = process.communicate(timeout=timeout_s)
-        except subprocess.TimeoutExpired:
-            raise RoomRejected(
-                "timeout", f"Infinigen took longer than rooms.timeout_s = {timeout_s:.0f} seconds"
-            ) from None
-        finally:
-            if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)
-    if process.returncode != 0:
-        last_lines = "\n".join(stderr.strip().splitlines()[-STDERR_LINES:])
-        raise RoomRejected("crash", f"Infinigen failed with exit code {process.returncode}:\n{last_lines}")
+    def no_events(event: Event) -> None:
+        pass
+
+    job_path = folder / "job.json"
+    try:
+        run_script(SCRIPT, job_path, blender=None, scratch=folder, silence_timeout_s=timeout_s, on_event=no_events)
+    except BlenderError as error:
+        if error.silent:
+            raise RoomRejected("timeout", f"Infinigen took longer than rooms.timeout_s = {timeout_s:.0f} s") from None
+        raise RoomRejected("crash", f"Infinigen failed: {error}") from None

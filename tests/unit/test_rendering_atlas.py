@@ -8,8 +8,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from perpetua.blender import SCRIPT_FOLDER
 from perpetua.rendering.bake import bake_room, texel_budget
-from perpetua.rendering.blender import SCRIPT_FOLDER
 from perpetua.rendering.config import RenderConfig
 from perpetua.rooms.types import Room
 

@@ -225,7 +225,7 @@ def make_shoes(wearer: Wearer, pattern: ShoePattern, rng: np.random.Generator) -
         length = last.along_m[-1] - last.along_m[0]
         under = np.array([-pattern.sole_m])
         middle = 0.5 * (last.to_left_m - last.to_right_m)
-        for points, share in ((heels, 0.12), (toes, 0.88)):
+        for points, share in ((heels, 0.03), (toes, 0.88)):
             along = np.array([last.along_m[0] + share * length])
             points.append(_place(last, along, np.interp(along, last.along_m, middle), under)[0])
         floor_z_m += 0.5 * float(last.origin_m[2] - pattern.sole_m)

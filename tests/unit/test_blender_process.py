@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from perpetua.blender import BlenderError, Event, run_script
 from perpetua.errors import AssetError, EnvironmentSetupError
-from perpetua.rendering.blender import BlenderError, Event, run_script
 
 
 def _run(tmp_path: Path, body: str, timeout_s: float = 20.0, blender: str | None = None) -> list[Event]:

@@ -15,7 +15,7 @@ from typing import IO, Any
 from perpetua.errors import AssetError, EnvironmentSetupError, StageError
 from perpetua.system_libraries import SYSTEM_LIBRARIES
 
-SCRIPT_FOLDER = Path(__file__).parent.parent.parent / "blender_scripts"
+SCRIPT_FOLDER = Path(__file__).parent.parent / "blender_scripts"
 TAIL_LINES = 12
 READ_BYTES = 65536
 
@@ -23,12 +23,13 @@ Event = dict[str, Any]
 
 
 class BlenderError(StageError):
-    """A Blender process crashed, failed or hung. ``reason`` is one clause; ``tail`` its last lines."""
+    """A Blender process crashed, failed or hung (``silent``). ``reason`` is one clause; ``tail`` its last lines."""
 
-    def __init__(self, reason: str, tail: str) -> None:
+    def __init__(self, reason: str, tail: str, silent: bool = False) -> None:
         super().__init__(f"{reason}\n{tail}" if tail else reason)
         self.reason = reason
         self.tail = tail
+        self.silent = silent
 
 
 def run_script(
@@ -72,7 +73,8 @@ def run_script(
         finally:
             _kill_group(process)
     if silent:
-        raise BlenderError(f"Blender made no progress for {silence_timeout_s:g} s and was stopped", _tail(log_path))
+        reason = f"Blender made no progress for {silence_timeout_s:g} s and was stopped"
+        raise BlenderError(reason, _tail(log_path), silent=True)
     if code != 0:
         raise _explain_exit(code, _tail(log_path))
 
