@@ -12,7 +12,7 @@ from perpetua.actors.config import RoutesConfig
 from perpetua.actors.routes import losses
 from perpetua.actors.routes.checks import TimedPaths, required_clearance_m
 from perpetua.navigation.types import NavGrid
-from perpetua.optimisation import minimise
+from perpetua.optimisation import deterministic_torch, minimise
 
 # Wishes are a little stricter than the limits, so that the optimum lies inside them.
 CLEARANCE_MARGIN_M = 0.04
@@ -41,7 +41,7 @@ def optimise_paths(walks: TimedPaths, grid: NavGrid, config: RoutesConfig) -> Ti
         return weighted_losses(position_m, heading_rad, clearance_m, wanted_m, start_m, walks.step_s, config)
 
     minimise([shift_m, turn_rad], loss_terms, config.steps, config.learning_rate)
-    with torch.no_grad():
+    with deterministic_torch(), torch.no_grad():
         position_m, heading_rad = present()
         return TimedPaths(position_m.numpy(), heading_rad.numpy(), walks.step_s)
 
