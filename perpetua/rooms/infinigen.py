@@ -18,6 +18,8 @@ from perpetua.rooms.types import Room, SceneObject
 from perpetua.seeding import StageSeed
 
 SCRIPT = SCRIPT_FOLDER / "infinigen_room.py"
+# Infinigen furnishes a bathroom with few things: at full size most of it would be empty floor.
+SIDE_SCALE: dict[RoomKind, float] = {"bathroom": 0.8}
 
 
 @ROOM_SOURCES.register("infinigen")
@@ -43,7 +45,7 @@ class InfinigenRooms:
         job = {
             "kind": kind,
             "seed": int(rng.integers(2**31)),
-            "dimensions_m": draw_dimensions_m(config, rng),
+            "dimensions_m": draw_dimensions_m(kind, config, rng),
             "folder": str(folder),
         }
         (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
@@ -54,9 +56,9 @@ class InfinigenRooms:
         return room
 
 
-def draw_dimensions_m(config: RoomsConfig, rng: np.random.Generator) -> list[float]:
+def draw_dimensions_m(kind: RoomKind, config: RoomsConfig, rng: np.random.Generator) -> list[float]:
     """Sides along x and y and height of a room, metres, to the centimetre."""
-    sides_m = rng.uniform(config.min_side_m, config.max_side_m, size=2)
+    sides_m = SIDE_SCALE.get(kind, 1.0) * rng.uniform(config.min_side_m, config.max_side_m, size=2)
     height_m = rng.uniform(config.min_height_m, config.max_height_m)
     return [round(float(length_m), 2) for length_m in (*sides_m, height_m)]
 

@@ -91,11 +91,13 @@ def test_names_become_plain_nouns(name: str, category: str) -> None:
 
 def test_dimensions_stay_in_their_limits_and_follow_the_seed() -> None:
     config = RoomsConfig(min_side_m=5.0, max_side_m=6.0, min_height_m=2.5, max_height_m=2.7)
-    draws = [draw_dimensions_m(config, StageSeed(7, room, "room").stream("infinigen", 0)) for room in range(200)]
+    draws = [
+        draw_dimensions_m("kitchen", config, StageSeed(7, room, "room").stream("infinigen", 0)) for room in range(200)
+    ]
     low, high = np.min(draws, axis=0), np.max(draws, axis=0)
     assert (low >= [5.0, 5.0, 2.5]).all() and (high <= [6.0, 6.0, 2.7]).all()
     assert (high - low > [0.9, 0.9, 0.18]).all()
-    assert draws[3] == draw_dimensions_m(config, StageSeed(7, 3, "room").stream("infinigen", 0))
+    assert draws[3] == draw_dimensions_m("kitchen", config, StageSeed(7, 3, "room").stream("infinigen", 0))
 
 
 def test_the_room_comes_back_as_the_script_wrote_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
