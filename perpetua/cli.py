@@ -31,6 +31,12 @@ class PerpetuaGroup(click.Group):
             context.exit(error.exit_code)
 
 
+def _wide_console() -> Console:
+    """As wide as the terminal; in a pipe or file wide enough for a table's lines to stay whole."""
+    console = Console()
+    return console if console.is_terminal else Console(width=160)
+
+
 @click.group(cls=PerpetuaGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(perpetua.__version__, prog_name="perpetua")
 def main() -> None:
@@ -100,7 +106,7 @@ def status(out: Path, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(report.to_json(), indent=1))
     else:
-        Console().print(status_table(report))
+        _wide_console().print(status_table(report))
         for line in report.notes():
             click.echo(line)
 
@@ -121,7 +127,7 @@ def verify(folders: tuple[Path, ...], as_json: bool) -> None:
         click.echo(json.dumps([report.to_json() for report in reports], indent=1))
     else:
         for report in reports:
-            Console().print(report.table())
+            _wide_console().print(report.table())
     sys.exit(0 if all(report.passed for report in reports) else 1)
 
 
@@ -157,7 +163,7 @@ def assets() -> None:
     for asset in load_manifest():
         present = asset.find() is not None
         table.add_row(asset.name, "present" if present else "missing", asset.what, asset.licence, asset.without_it)
-    Console().print(table)
+    _wide_console().print(table)
     click.echo(f"files are looked for in {asset_folder()} (set PERPETUA_ASSETS to change it)")
 
 
@@ -171,7 +177,7 @@ def doctor(out: Path) -> None:
     table = Table("what", "state", "found", "what to do")
     for finding in findings:
         table.add_row(finding.subject, finding.state, finding.value, finding.remedy)
-    Console().print(table)
+    _wide_console().print(table)
     missing = [finding for finding in findings if finding.state == "missing"]
     for finding in missing:
         click.echo(f"{finding.subject} is missing: {finding.remedy}")

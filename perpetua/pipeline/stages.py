@@ -25,7 +25,7 @@ from perpetua.navigation.types import NavGrid
 from perpetua.pipeline.config import RedrawConfig
 from perpetua.pipeline.record import sequence_record
 from perpetua.rendering.bake import BAKE_SCRIPT
-from perpetua.rendering.job import FRAME_FOLDER, PROCESS_SETTINGS
+from perpetua.rendering.job import PROCESS_SETTINGS
 from perpetua.rendering.render import RENDER_SCRIPT, render_views
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.source import build_room
@@ -39,6 +39,8 @@ Value = TypeVar("Value")
 # Where the export stage writes the sequence inside its folder, until it is published.
 SEQUENCE_FOLDER = "sequence"
 AUDIT_FILE = "audit.json"
+# Where Blender's job and its finished frames lie, inside the folder of the render stage.
+RENDER_JOB_FOLDER = "job"
 
 
 @dataclass(frozen=True)
@@ -193,8 +195,9 @@ def _render(context: StageContext) -> tuple[RenderedView, ...]:
         context.many("cameras", CameraPath),
         context.config.render,
         context.device,
-        context.folder,
+        context.folder / RENDER_JOB_FOLDER,
         context.on_frame,
+        result_dir=context.folder,
     )
 
 
@@ -273,7 +276,7 @@ STAGES = (
         _render,
         scripts=(BAKE_SCRIPT.name, RENDER_SCRIPT.name),
         resumable=True,
-        leftovers=(FRAME_FOLDER,),
+        leftovers=(RENDER_JOB_FOLDER,),
     ),
     Stage(80, "tracks", 1, ("room", "actors", "cameras", "render"), _settings("tracks"), _tracks),
     Stage(

@@ -32,6 +32,7 @@ def render_views(
     work_dir: Path,
     on_frame: Callable[[int, int, float], None],
     script: Path = RENDER_SCRIPT,
+    result_dir: Path | None = None,
 ) -> tuple[RenderedView, ...]:
     """Renders synchronized RGB, depth and object index of all views.
 
@@ -44,9 +45,10 @@ def render_views(
         cameras: at least one; all with the same number of frames.
         config: the render section of the config.
         device: one of ``DEVICES``.
-        work_dir: folder that outlives this call; the returned arrays are mapped from files in it.
+        work_dir: folder that outlives this call, for the job and what is needed to go on with it.
         on_frame: called with (frames done, frames in all, seconds of this frame).
         script: the worker that Blender runs.
+        result_dir: folder for the files that the returned arrays are mapped from; None: ``work_dir``.
 
     Returns:
         One view per camera, in the order of the cameras.
@@ -62,7 +64,7 @@ def render_views(
     job_path = write_job(work_dir, room, actors, cameras, config, device)
     _render_pending(job_path, cameras, frame_count, config, on_frame, script)
     frames = work_dir / FRAME_FOLDER
-    return tuple(assemble_view(frames, camera, frame_count, work_dir) for camera in cameras)
+    return tuple(assemble_view(frames, camera, frame_count, result_dir or work_dir) for camera in cameras)
 
 
 def _check_job(room: Room, actors: tuple[ActorMesh, ...], cameras: tuple[CameraPath, ...], device: str) -> int:
