@@ -28,7 +28,7 @@ from perpetua.rendering.bake import BAKE_SCRIPT
 from perpetua.rendering.job import PROCESS_SETTINGS
 from perpetua.rendering.render import RENDER_SCRIPT, render_views
 from perpetua.rendering.types import RenderedView
-from perpetua.rooms.source import build_room
+from perpetua.rooms.build import build_room
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 from perpetua.tracks.make import make_tracks

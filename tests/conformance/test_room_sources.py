@@ -6,13 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import perpetua.rooms.infinigen
-import perpetua.rooms.procedural  # noqa: F401  (both modules enter their sources)
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
+from perpetua.rooms.build import build_room
 from perpetua.rooms.config import RoomKind, RoomsConfig
-from perpetua.rooms.source import ROOM_SOURCES, build_room
+from perpetua.rooms.source import ROOM_SOURCES
 from perpetua.rooms.types import ROOM_KINDS, Room
 from perpetua.seeding import StageSeed
 

@@ -78,7 +78,7 @@ def test_a_command_does_not_run(tmp_path: Path, where: str) -> None:
         Call(io.open, "x", "w"),
         Call(pickle.loads, b""),
     ],
-    ids=lambda call: str(call.function),
+    ids=lambda call: call.function.__qualname__ + call.function.__module__,
 )
 def test_no_other_name_is_known(tmp_path: Path, call: Call) -> None:
     save_pickle(tmp_path / "evil.npy", pickle.dumps(call))

@@ -14,9 +14,9 @@ from perpetua.errors import EnvironmentSetupError, RoomError
 from perpetua.navigation.config import NavigationConfig
 from perpetua.rooms import infinigen
 from perpetua.rooms.acceptance import RoomRejected
+from perpetua.rooms.build import build_room
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.infinigen import InfinigenRooms, draw_dimensions_m
-from perpetua.rooms.source import build_room
 from perpetua.seeding import StageSeed
 
 SEED = StageSeed(7, 0, "room")
