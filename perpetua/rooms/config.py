@@ -18,7 +18,9 @@ class RoomsConfig(Section):
         description="room kinds to draw from",
         min_length=1,
     )
-    min_side_m: float = Field(5.0, ge=3.0, le=12.0, description="shortest side of the floor, metres")
+    min_side_m: float = Field(
+        5.0, ge=3.0, le=12.0, description="shortest side of the floor (Infinigen's bathrooms: a fifth less), metres"
+    )
     max_side_m: float = Field(7.0, ge=3.0, le=15.0, description="longest side of the floor, metres")
     min_height_m: float = Field(2.5, ge=2.2, le=5.0, description="lowest ceiling, metres")
     max_height_m: float = Field(3.1, ge=2.2, le=6.0, description="highest ceiling, metres")

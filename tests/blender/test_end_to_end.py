@@ -52,7 +52,8 @@ def test_sequence_is_complete_and_passes_verify(finished: Path) -> None:
     for view in range(4):
         depth_m = np.load(sequence / str(view) / "depth.npy")
         assert depth_m.shape == (frames, config.render.height_px, config.render.width_px)
-        assert (depth_m > 0).mean() > 0.9
+        # What is left is seen through windows.
+        assert (depth_m > 0).mean() > 0.6
     reports = json.loads(_perpetua("verify", str(finished), "--json"))
     assert [report["passed"] for report in reports] == [True]
 

@@ -47,7 +47,8 @@ def test_room_is_of_the_kind_and_large_enough(made: Made) -> None:
     sides_m = np.ptp(room.floor_polygon_m, axis=0)
     assert room.kind == kind
     assert room.name
-    assert config.min_side_m - 0.3 <= sides_m.min()
+    # Bathrooms may be smaller.
+    assert 0.8 * config.min_side_m - 0.3 <= sides_m.min()
     assert sides_m.max() <= config.max_side_m + 0.3
     assert 2.2 <= room.height_m <= 4.0
 
@@ -120,10 +121,10 @@ def test_same_seed_same_room(made: Made, tmp_path: Path) -> None:
         assert np.array_equal(first.mesh.faces, second.mesh.faces), first.name
 
 
-def test_another_attempt_is_another_room(made: Made, tmp_path: Path) -> None:
-    source, kind, room, _ = made
-    if source in BLENDER_SOURCES:
-        pytest.skip("one draw more of a Blender source shows nothing that its own tests do not")
-    config = RoomsConfig()
-    other = ROOM_SOURCES[source]().make(kind, config, SEED, 1, tmp_path)
-    assert not np.array_equal(room.floor_polygon_m, other.floor_polygon_m)
+@pytest.mark.parametrize("source", sorted(set(ROOM_SOURCES) - BLENDER_SOURCES))
+def test_another_attempt_is_another_room(source: str, tmp_path: Path) -> None:
+    # A Blender source takes a minute per draw; its own tests show that the attempt reaches its job.
+    first, other = (
+        ROOM_SOURCES[source]().make("kitchen", RoomsConfig(), SEED, attempt, tmp_path) for attempt in (0, 1)
+    )
+    assert not np.array_equal(first.floor_polygon_m, other.floor_polygon_m)
