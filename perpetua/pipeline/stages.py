@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from perpetua.actors.assembly import assemble_actors, draw_bodies
 from perpetua.actors.bodies.source import Body
 from perpetua.actors.config import ActorsConfig
-from perpetua.actors.motion.plan import make_motions
+from perpetua.actors.motion.plan import action_descriptions, make_motions
 from perpetua.actors.routes import plan_routes
 from perpetua.actors.types import ActorMesh, BodyMotion, Route
 from perpetua.actors.validation import validate_actors
@@ -35,6 +35,9 @@ from perpetua.tracks.make import make_tracks
 from perpetua.tracks.types import SequenceTracks
 
 Value = TypeVar("Value")
+
+_FRAMES = "sequence.frames"
+_FPS = "sequence.fps"
 
 # Where the export stage writes the sequence inside its folder, until it is published.
 SEQUENCE_FOLDER = "sequence"
@@ -147,6 +150,12 @@ def _draw_bodies_once(actors_json: str, seed: int, room: int) -> tuple[Body, ...
     return draw_bodies(ActorsConfig.model_validate_json(actors_json), StageSeed(seed, room, "bodies"))
 
 
+def _motion_settings(config: Config) -> dict[str, Any]:
+    """The list of actions counts by what it says, not by its name."""
+    descriptions = list(action_descriptions(config.actors.motion))
+    return {**_settings("actors", _FPS)(config), "descriptions": descriptions}
+
+
 def _motion(context: StageContext) -> tuple[BodyMotion, ...]:
     skeletons = tuple(body.skeleton for body in _bodies(context))
     routes = context.many("routes", Route)
@@ -233,9 +242,6 @@ def _audit(context: StageContext) -> None:
         raise AuditError(f"the finished sequence does not pass its audit: {failures}")
 
 
-_FRAMES = "sequence.frames"
-_FPS = "sequence.fps"
-
 STAGES = (
     Stage(
         10,
@@ -257,7 +263,7 @@ STAGES = (
         _routes,
         redraw=_every_time,
     ),
-    Stage(40, "motion", 1, ("routes",), _settings("actors", _FPS), _motion),
+    Stage(40, "motion", 1, ("routes",), _motion_settings, _motion),
     Stage(50, "actors", 1, ("room", "routes", "motion"), _settings("actors", _FPS), _actors),
     Stage(
         60,

@@ -19,7 +19,7 @@ def draw_actions(actors: tuple[int, ...], config: MotionConfig, seed: StageSeed)
     Raises:
         ConfigError: ``actors.motion.actions`` names no list of descriptions.
     """
-    descriptions = _descriptions(config)
+    descriptions = action_descriptions(config)
     order = seed.stream("actions").permutation(len(descriptions))
     return tuple(descriptions[order[actor % len(order)]] for actor in actors)
 
@@ -47,14 +47,19 @@ def make_motions(
     )
 
 
-def _descriptions(config: MotionConfig) -> tuple[str, ...]:
+def action_descriptions(config: MotionConfig) -> tuple[str, ...]:
+    """The descriptions that actions are drawn from.
+
+    Raises:
+        ConfigError: ``actors.motion.actions`` names no list, or the list is not one of descriptions.
+    """
     if config.descriptions:
         return config.descriptions
-    path = ACTION_FOLDER / f"{config.actions}.yaml"
-    if not path.is_file():
-        known = sorted(file.stem for file in ACTION_FOLDER.glob("*.yaml"))
-        raise ConfigError(f"actors.motion.actions must be one of {known}, not '{config.actions}'")
-    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    lists = {path.stem: path for path in sorted(ACTION_FOLDER.glob("*.yaml"))}
+    if config.actions not in lists:
+        raise ConfigError(f"actors.motion.actions must be one of {list(lists)}, not '{config.actions}'")
+    content = yaml.safe_load(lists[config.actions].read_text(encoding="utf-8"))
     if not isinstance(content, list) or not content or not all(isinstance(line, str) for line in content):
+        path = lists[config.actions]
         raise ConfigError(f"'{path}' must be a list of action descriptions in plain words, one a line")
     return tuple(content)
