@@ -17,7 +17,11 @@ KEY = 0.22
 # The brightest hundredth stays under this, where the view transform still tells tones apart.
 MAX_HIGHLIGHT = 6.0
 LIMIT_EV = 14.0
-MAX_GAIN = 4.0
+MAX_GAIN = 2.0
+# Shades of Grey: 1 would be a grey world, which takes green walls for green light; infinity the brightest spot alone.
+MINKOWSKI_NORM = 6
+# Lamps themselves, brighter than this share of the picture, do not count more than what they light.
+LAMP_QUANTILE = 0.95
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -35,13 +39,16 @@ def exposure_ev(linear_rgb: np.ndarray) -> float:
 def white_balance(linear_rgb: np.ndarray, strength: float) -> tuple[float, float, float]:
     """Gains for red, green and blue that take a share (0 to 1) of the picture's colour cast out of it.
 
-    The cast is that of the log-averages (a grey world), in which small bright things count little. The gains keep
-    the luminance of the cast's colour.
+    The cast is estimated by Shades of Grey (Finlayson and Trezzi 2004), in which bright surfaces count most: they tell
+    the light's colour best. The gains keep the luminance of the cast's colour.
     """
-    lit = linear_rgb[(linear_rgb > 1e-6).all(axis=1)]
+    lit = linear_rgb[(linear_rgb > 1e-6).all(axis=1)].astype(np.float64)
     if len(lit) == 0:
         return (1.0, 1.0, 1.0)
-    average = np.exp(np.log(lit).mean(axis=0))
+    luminance = lit @ LUMINANCE
+    limit = np.quantile(luminance, LAMP_QUANTILE)
+    lit *= np.minimum(1.0, limit / luminance)[:, None] / limit
+    average = (lit**MINKOWSKI_NORM).mean(axis=0) ** (1.0 / MINKOWSKI_NORM)
     gains = (float(average @ LUMINANCE) / average) ** strength
     gains = np.clip(gains, 1.0 / MAX_GAIN, MAX_GAIN)
     gains *= float(average @ LUMINANCE) / float((gains * average) @ LUMINANCE)
