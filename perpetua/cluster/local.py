@@ -1,8 +1,10 @@
 """Rooms on this machine: one after another here, or several at a time in worker processes."""
 
+import ctypes
 import logging
 import multiprocessing
 import signal
+import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing.managers import SyncManager
@@ -12,6 +14,8 @@ from types import FrameType
 
 from perpetua.errors import PerpetuaError
 from perpetua.pipeline.events import Event, OnEvent
+
+PR_SET_PDEATHSIG = 1
 
 RoomJob = Callable[[int, OnEvent], None]
 
@@ -75,7 +79,7 @@ def _run_in_processes(rooms: Sequence[int], workers: int, job: RoomJob, on_event
     context = multiprocessing.get_context("spawn")
     failures: dict[int, str] = {}
     manager = SyncManager(ctx=context)
-    manager.start(_ignore_interrupts)
+    manager.start(_start_manager)
     with manager:
         events: Queue[Event | None] = manager.Queue()
         reporter = Thread(target=_drain, args=(events.get, on_event), daemon=True)
@@ -100,14 +104,25 @@ def _run_in_processes(rooms: Sequence[int], workers: int, job: RoomJob, on_event
     return dict(sorted(failures.items()))
 
 
-def _ignore_interrupts() -> None:
+def _start_manager() -> None:
+    """The events' keeper outlives the workers: it ends when the run does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    _die_with_parent()
 
 
 def _start_worker() -> None:
+    """A worker ends at once on SIGTERM, without a word: a stage is finished or absent, so nothing is lost."""
     logging.getLogger("perpetua").setLevel(logging.INFO)
-    raise_on_sigterm()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    _die_with_parent()
+
+
+def _die_with_parent() -> None:
+    """Asks the kernel (Linux alone can) to end this process when the run that started it is killed."""
+    if sys.platform.startswith("linux"):
+        ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _stop(pool: ProcessPoolExecutor) -> None:

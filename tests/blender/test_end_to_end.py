@@ -102,6 +102,35 @@ def _frames_rendered(log: Path) -> list[int]:
     return [line["frames_done"] for line in lines if line["kind"] == "frame_rendered"]
 
 
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(tmp_path: Path, workers: str) -> None:
+    arguments = ("generate", "--preset", "tiny", "--rooms", "2", "--workers", workers, "--out", str(tmp_path))
+    run = subprocess.Popen(
+        _command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    deadline = time.monotonic() + 120
+    log = tmp_path / "log.jsonl"
+    while not (log.exists() and '"stage_started"' in log.read_text()):
+        assert run.poll() is None and time.monotonic() < deadline
+        time.sleep(0.05)
+    os.killpg(run.pid, signal.SIGINT)
+    out, err = run.communicate(timeout=60)
+    assert run.returncode == 130, out + err
+    assert "To go on, run the same command again" in out
+    assert err == ""
+    while _group_lives(run.pid):
+        assert time.monotonic() < deadline, "a process of the run is left"
+        time.sleep(0.05)
+
+
+def _group_lives(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
 def test_third_of_three_rooms_is_the_room_made_alone(finished: Path, tmp_path: Path) -> None:
     _perpetua(
         "generate", "--preset", "tiny", "--seed", str(SEED), "--rooms", "3", "--workers", "2",
