@@ -11,9 +11,10 @@ from rich.table import Table
 
 import perpetua
 from perpetua.config import Config, load_config, presets
-from perpetua.errors import PerpetuaError
+from perpetua.errors import InputError, PerpetuaError
 
 DEVICES = ("auto", "cpu", "cuda", "optix", "hip", "metal", "oneapi")
+PICTURE_SUFFIXES = (".png", ".jpg")
 OUT_OPTION = click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True,
     help="Output folder.",
@@ -133,10 +134,10 @@ def verify(folders: tuple[Path, ...], as_json: bool) -> None:
 
 @main.command()
 @click.argument("sequence", type=click.Path(path_type=Path))
+@click.option("--out", "png", type=click.Path(path_type=Path, dir_okay=False), help="Picture to write, .png or .jpg.")
 @click.option(
-    "--out", "png", type=click.Path(path_type=Path, dir_okay=False), help="PNG to write; default: SEQUENCE.png here."
+    "--plan", "plan_png", type=click.Path(path_type=Path, dir_okay=False), help="Also a plan, to this .png or .jpg."
 )
-@click.option("--plan", "plan_png", type=click.Path(path_type=Path, dir_okay=False), help="Also a plan, to this PNG.")
 @click.option("--times", type=click.IntRange(1, 24), default=6, show_default=True, help="Frames shown.")
 def preview(sequence: Path, png: Path | None, plan_png: Path | None, times: int) -> None:
     """Draw a contact sheet of a sequence: views by times, tracks with fading tails, depth, actors.
@@ -147,6 +148,9 @@ def preview(sequence: Path, png: Path | None, plan_png: Path | None, times: int)
     from perpetua.audit.plan_view import write_plan_view
 
     target = png if png is not None else Path(f"{sequence.absolute().name}.png")
+    for picture in (target, plan_png):
+        if picture is not None and picture.suffix.lower() not in PICTURE_SUFFIXES:
+            raise InputError(f"a picture must end in {' or '.join(PICTURE_SUFFIXES)}, not '{picture.name}'")
     write_contact_sheet(sequence, target, times)
     click.echo(f"wrote {target}")
     if plan_png is not None:

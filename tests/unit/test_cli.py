@@ -61,6 +61,7 @@ def test_standard_is_the_default_preset(tmp_path: Path) -> None:
         (("clean", "--out", "no-such-folder"), "holds no run of perpetua"),
         (("verify", "no-such-folder"), "no-such-folder"),
         (("preview", "no-such-folder"), "no-such-folder"),
+        (("preview", ".", "--out", "sheet.gif"), "a picture must end in .png or .jpg, not 'sheet.gif'"),
     ],
 )
 def test_bad_input_gives_a_clear_error_and_exit_code_2(
