@@ -81,7 +81,7 @@ def generate(
     Stopped at any moment, the same command goes on where it was. Room k of a seed is the same however many rooms
     are made, in whichever order.
     """
-    from perpetua.generate import GenerateRequest, run_generate
+    from perpetua.generation import GenerateRequest, run_generate
 
     request = GenerateRequest(
         config=load_config(preset, config_path, assignments),
