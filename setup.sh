@@ -7,10 +7,13 @@ cd "$(dirname "$0")"
 
 python=${PYTHON:-python3.11}
 venv=.venv
-dev=false
-[ "${1:-}" = "--dev" ] && dev=true
-
 fail() { printf 'setup: %s\n' "$1" >&2; exit 2; }
+
+case "${1:-}" in
+    "") dev=false ;;
+    --dev) dev=true ;;
+    *) fail "takes --dev or nothing, not '$1'" ;;
+esac
 
 command -v "$python" >/dev/null || fail "needs Python 3.11 ('$python' not found): on Debian 12 run: sudo apt-get install -y python3.11-venv, or set PYTHON"
 "$python" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || fail "'$python' is not Python 3.11, the only one that bpy 4.2.0 has wheels for: set PYTHON"
@@ -22,7 +25,7 @@ for installed in $venv/.installed-dev $venv/.installed; do
     [ -f "$installed" ] && [ "$(cat "$installed")" = "$stamp" ] && exit 0
 done
 
-[ -x $venv/bin/python ] || "$python" -m venv $venv || fail "cannot make a virtual environment: on Debian or Ubuntu run: sudo apt-get install -y python3.11-venv"
+[ -x $venv/bin/pip ] || "$python" -m venv --clear $venv || fail "cannot make a virtual environment: on Debian or Ubuntu run: sudo apt-get install -y python3.11-venv"
 pip=($venv/bin/python -m pip install --disable-pip-version-check --quiet)
 
 echo "setup: installing pinned packages into $venv (about 4 GB, more with CUDA)"
