@@ -33,7 +33,7 @@ def build_room(config: RoomsConfig, navigation: NavigationConfig, seed: StageSee
             check_room(room, config, navigation)
             return room
         except RoomRejected as rejection:
-            logger.info("room %d, draw %d of a %s rejected: %s", seed.room, attempt, kind, rejection)
+            logger.info("draw %d of a %s rejected: %s", attempt, kind, rejection)
             reasons[rejection.rule] += 1
     counts = ", ".join(f"{rule} ({count} x)" for rule, count in reasons.most_common())
     raise RoomError(
