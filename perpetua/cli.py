@@ -163,10 +163,11 @@ def assets() -> None:
     """List outside assets: present or missing, licence, and what is lost without them."""
     from perpetua.assets import asset_folder, load_manifest
 
-    table = Table("asset", "state", "what", "licence", "without it")
+    table = Table("asset", "state", "what", "licence", "used by", "without it")
     for asset in load_manifest():
         present = asset.find() is not None
-        table.add_row(asset.name, "present" if present else "missing", asset.what, asset.licence, asset.without_it)
+        state = "present" if present else "missing"
+        table.add_row(asset.name, state, asset.what, asset.licence, asset.config_key, asset.without_it)
     _wide_console().print(table)
     click.echo(f"files are looked for in {asset_folder()} (set PERPETUA_ASSETS to change it)")
 

@@ -8,8 +8,6 @@ from jaxtyping import Float64, UInt8
 
 from perpetua.geometry.mesh import TriMesh
 
-ROOM_KINDS = ("bathroom", "bedroom", "diningroom", "kitchen", "livingroom")
-
 
 @dataclass(frozen=True)
 class Material:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from perpetua.navigation.types import NavGrid
 from perpetua.rooms.build import build_room
 from perpetua.rooms.config import RoomKind, RoomsConfig
 from perpetua.rooms.source import ROOM_SOURCES
-from perpetua.rooms.types import ROOM_KINDS, Room
+from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 
 NAVIGATION = NavigationConfig()
@@ -26,7 +27,7 @@ def _cases() -> Iterator[object]:
     for source in ROOM_SOURCES:
         slow = source in BLENDER_SOURCES
         marks = [pytest.mark.slow, pytest.mark.blender, pytest.mark.infinigen] if slow else []
-        for kind in BLENDER_SOURCES.get(source, ROOM_KINDS):
+        for kind in BLENDER_SOURCES.get(source, get_args(RoomKind)):
             yield pytest.param((source, kind), id=f"{source}-{kind}", marks=marks)
 
 

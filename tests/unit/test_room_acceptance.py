@@ -1,6 +1,7 @@
 """Which rooms pass, and which rule each bad room breaks."""
 
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -8,8 +9,8 @@ import pytest
 from perpetua.geometry.mesh import TriMesh
 from perpetua.navigation.config import NavigationConfig
 from perpetua.rooms.acceptance import REQUIRED_FURNITURE, RoomRejected, check_room
-from perpetua.rooms.config import RoomsConfig
-from perpetua.rooms.types import ROOM_KINDS, Room, SceneObject
+from perpetua.rooms.config import RoomKind, RoomsConfig
+from perpetua.rooms.types import Room, SceneObject
 
 NAVIGATION = NavigationConfig(cell_m=0.1)
 CONFIG = RoomsConfig()
@@ -52,13 +53,13 @@ def _rule(room: Room, config: RoomsConfig = CONFIG) -> str:
     return rejection.value.rule
 
 
-@pytest.mark.parametrize("kind", ROOM_KINDS)
+@pytest.mark.parametrize("kind", get_args(RoomKind))
 def test_a_room_with_its_furniture_and_floor_passes(kind: str) -> None:
     check_room(_room(kind), CONFIG, NAVIGATION)
 
 
 @pytest.mark.parametrize(
-    ("kind", "category"), [(kind, min(group)) for kind in ROOM_KINDS for group in REQUIRED_FURNITURE[kind]]
+    ("kind", "category"), [(kind, min(group)) for kind in get_args(RoomKind) for group in REQUIRED_FURNITURE[kind]]
 )
 def test_missing_furniture_is_named(kind: str, category: str) -> None:
     room = _room(kind, missing=category)
