@@ -1,6 +1,7 @@
 """The camera stage: candidates drawn from the seed, optimised together; the best one that passes the audit wins."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float64
@@ -41,6 +42,18 @@ class CameraPlan:
     redraw: int
     candidate: int
 
+    def to_json(self) -> dict[str, Any]:
+        """The figures of the audit and of the losses, as plain values."""
+        return {
+            "scene_distance_m": self.audit.scene_distance_m.tolist(),
+            "actor_distance_m": self.audit.actor_distance_m.tolist(),
+            "focus_share": self.audit.focus_share.tolist(),
+            "travel_m": self.audit.travel_m.tolist(),
+            "loss_terms": self.terms,
+            "redraw": self.redraw,
+            "candidate": self.candidate,
+        }
+
 
 @dataclass(frozen=True)
 class _Scene:
@@ -61,20 +74,6 @@ class _Scene:
 
 
 def plan_cameras(
-    room: Room,
-    actors: tuple[ActorMesh, ...],
-    config: CamerasConfig,
-    frames: int,
-    fps: float,
-    width_px: int,
-    height_px: int,
-    seed: StageSeed,
-) -> tuple[CameraPath, ...]:
-    """The paths of ``make_camera_plan``, which says more."""
-    return make_camera_plan(room, actors, config, frames, fps, width_px, height_px, seed).paths
-
-
-def make_camera_plan(
     room: Room,
     actors: tuple[ActorMesh, ...],
     config: CamerasConfig,

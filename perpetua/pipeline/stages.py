@@ -18,7 +18,7 @@ from perpetua.cameras.plan import plan_cameras
 from perpetua.cameras.types import CameraPath
 from perpetua.config import Config
 from perpetua.errors import AuditError
-from perpetua.files import write_json
+from perpetua.files import read_json, write_json
 from perpetua.formats import EXPORTERS
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
@@ -42,6 +42,9 @@ _FPS = "sequence.fps"
 # Where the export stage writes the sequence inside its folder, until it is published.
 SEQUENCE_FOLDER = "sequence"
 AUDIT_FILE = "audit.json"
+# Figures of the stages' own checks, which the audit gathers.
+ACTOR_FIGURES = "validation.json"
+CAMERA_FIGURES = "plan.json"
 # Where Blender's job and its finished frames lie, inside the folder of the render stage.
 RENDER_JOB_FOLDER = "job"
 
@@ -174,13 +177,13 @@ def _actors(context: StageContext) -> tuple[ActorMesh, ...]:
         context.config.sequence.fps,
         context.config.actors.validation,
     )
-    write_json(context.folder / "validation.json", report.to_json())
+    write_json(context.folder / ACTOR_FIGURES, report.to_json())
     return actors
 
 
 def _cameras(context: StageContext) -> tuple[CameraPath, ...]:
     config = context.config
-    return plan_cameras(
+    plan = plan_cameras(
         context.one("room", Room),
         context.many("actors", ActorMesh),
         config.cameras,
@@ -190,6 +193,8 @@ def _cameras(context: StageContext) -> tuple[CameraPath, ...]:
         config.render.height_px,
         context.seed,
     )
+    write_json(context.folder / CAMERA_FIGURES, plan.to_json())
+    return plan.paths
 
 
 def _render_settings(config: Config) -> dict[str, Any]:
@@ -236,7 +241,12 @@ def _export(context: StageContext) -> None:
 
 def _audit(context: StageContext) -> None:
     report = verify_sequence(context.stage_folders["export"] / SEQUENCE_FOLDER, context.config.audit)
-    write_json(context.folder / AUDIT_FILE, report.to_json())
+    figures = {
+        "sequence": report.to_json(),
+        "actors": read_json(context.stage_folders["actors"] / ACTOR_FIGURES),
+        "cameras": read_json(context.stage_folders["cameras"] / CAMERA_FIGURES),
+    }
+    write_json(context.folder / AUDIT_FILE, figures)
     if not report.passed:
         failures = "; ".join(str(check) for check in report.checks if not check.passed)
         raise AuditError(f"the finished sequence does not pass its audit: {failures}")
@@ -288,6 +298,6 @@ STAGES = (
     Stage(
         90, "export", 1, ("room", "actors", "cameras", "render", "tracks"), lambda c: c.model_dump(mode="json"), _export
     ),
-    Stage(95, "audit", 1, ("export",), _settings("audit"), _audit),
+    Stage(95, "audit", 1, ("actors", "cameras", "export"), _settings("audit"), _audit),
 )
 STAGE_NAMES = tuple(stage.name for stage in STAGES)

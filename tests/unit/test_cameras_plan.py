@@ -8,7 +8,7 @@ import torch
 from camera_scene import camera_room, walker, walkers
 
 from perpetua.cameras.config import CamerasConfig
-from perpetua.cameras.plan import CameraPlan, make_camera_plan, plan_cameras
+from perpetua.cameras.plan import CameraPlan, plan_cameras
 from perpetua.cameras.views import view_coverage
 from perpetua.errors import CameraError
 from perpetua.geometry.mesh import join
@@ -22,7 +22,7 @@ SEED = StageSeed(5, 0, "cameras")
 
 @pytest.fixture(scope="module")
 def plan() -> CameraPlan:
-    return make_camera_plan(camera_room(), walkers(FRAMES), CONFIG, FRAMES, FPS, 96, 72, SEED)
+    return plan_cameras(camera_room(), walkers(FRAMES), CONFIG, FRAMES, FPS, 96, 72, SEED)
 
 
 def test_every_view_moves_and_keeps_its_distance(plan: CameraPlan) -> None:
@@ -63,7 +63,7 @@ def test_same_seed_same_bits_whatever_the_threads(plan: CameraPlan) -> None:
     threads = torch.get_num_threads()
     torch.set_num_threads(2)
     try:
-        again = plan_cameras(camera_room(), walkers(FRAMES), CONFIG, FRAMES, FPS, 96, 72, SEED)
+        again = plan_cameras(camera_room(), walkers(FRAMES), CONFIG, FRAMES, FPS, 96, 72, SEED).paths
     finally:
         torch.set_num_threads(threads)
     for first, second in zip(plan.paths, again, strict=True):
@@ -73,14 +73,14 @@ def test_same_seed_same_bits_whatever_the_threads(plan: CameraPlan) -> None:
 
 def test_another_room_of_the_same_seed_differs(plan: CameraPlan) -> None:
     quick = CONFIG.model_copy(update={"steps": 30, "candidates": 1, "min_focus_share": 0.0})
-    other = plan_cameras(camera_room(), walkers(FRAMES), quick, FRAMES, FPS, 96, 72, replace(SEED, room=1))
+    other = plan_cameras(camera_room(), walkers(FRAMES), quick, FRAMES, FPS, 96, 72, replace(SEED, room=1)).paths
     assert not np.allclose(other[0].world_from_camera, plan.paths[0].world_from_camera, atol=0.1)
 
 
 @pytest.mark.parametrize(("frames", "fps", "cameras"), [(2, 24.0, 1), (6, 6.0, 3)])
 def test_short_sequences_and_other_numbers_of_views(frames: int, fps: float, cameras: int) -> None:
     config = CamerasConfig(candidates=2, steps=40, voxel_m=0.12, count=cameras)
-    paths = plan_cameras(camera_room(), walkers(frames)[:cameras], config, frames, fps, 64, 48, SEED)
+    paths = plan_cameras(camera_room(), walkers(frames)[:cameras], config, frames, fps, 64, 48, SEED).paths
     assert len(paths) == cameras
     assert all(path.world_from_camera.shape == (frames, 4, 4) for path in paths)
     assert all((path.world_from_camera[0] != path.world_from_camera[-1]).any() for path in paths)
