@@ -67,7 +67,7 @@ def test_actors_walk_and_cameras_move(finished: Path) -> None:
         assert np.linalg.norm(centre_m - centre_m[0], axis=1).max() > 0.05
 
 
-def test_contact_sheet_status_and_clean(finished: Path) -> None:
+def test_contact_sheet_and_status(finished: Path) -> None:
     assert _layout(finished).contact_sheet.stat().st_size > 10_000
     status = json.loads(_perpetua("status", "--out", str(finished), "--json"))
     assert [room["state"] for room in status["rooms"]] == ["finished"]
@@ -92,7 +92,13 @@ def test_killed_while_rendering_ends_in_the_same_bytes(finished: Path, tmp_path:
     _perpetua("generate", *ONE_ROOM, "--out", str(tmp_path))
     after = _frames_rendered(log)[len(before) :]
     assert min(after) > max(before) >= 2
-    assert output_hashes(_layout(tmp_path).sequence_folder) == output_hashes(_layout(finished).sequence_folder)
+    undisturbed = output_hashes(_layout(finished).sequence_folder)
+    assert output_hashes(_layout(tmp_path).sequence_folder) == undisturbed
+
+    _perpetua("clean", "--out", str(tmp_path))
+    assert not (tmp_path / ".work").exists()
+    assert "render ..." not in _perpetua("generate", *ONE_ROOM, "--out", str(tmp_path))
+    assert output_hashes(_layout(tmp_path).sequence_folder) == undisturbed
 
 
 def _frames_rendered(log: Path) -> list[int]:
