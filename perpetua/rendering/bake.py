@@ -55,6 +55,7 @@ def bake_room(room: Room, config: RenderConfig, images_ahead: int, work_dir: Pat
     key = json.dumps([file_sha256(source), scripts_sha256((BAKE_SCRIPT.name,)), budget])
     baked = work_dir.resolve() / f"baked_{hashlib.sha256(key.encode()).hexdigest()[:24]}.blend"
     if not baked.is_file():
+        logger.info("baking the room's materials to at most %.1f million texels", budget / 1e6)
         job_path = work_dir / "bake.json"
         write_json(job_path, {"blend_path": str(source), "out_path": str(baked), "max_texels": budget})
         _bake(job_path, config, work_dir)
