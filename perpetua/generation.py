@@ -77,8 +77,10 @@ def make_room(request: GenerateRequest, until: str, room: int, on_event: OnEvent
     if until == STAGES[-1].name:
         layout = OutputLayout(request.out, request.config.export.split, request.seed, room)
         if not layout.contact_sheet.exists():
+            partial_sheet = layout.contact_sheet.with_name(f".{layout.contact_sheet.name}")
             layout.contact_sheet.parent.mkdir(parents=True, exist_ok=True)
-            write_contact_sheet(layout.sequence_folder, layout.contact_sheet)
+            write_contact_sheet(layout.sequence_folder, partial_sheet)
+            partial_sheet.replace(layout.contact_sheet)
 
 
 def _checked_stage(until: str | None) -> str:

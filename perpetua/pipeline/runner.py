@@ -3,6 +3,7 @@
 import shutil
 import time
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -156,6 +157,8 @@ class RoomRun:
         audit = read_json(self._folder_of("audit") / AUDIT_FILE)
         last = self.stages[-1].name
         write_json(partial / AUDIT_FILE, {**audit, "key": self.keys[last], "rejected_draws": self.rejected})
+        # A picture of an earlier sequence of this name must not outlive it.
+        self.layout.contact_sheet.unlink(missing_ok=True)
         store.replace_folder(partial, target)
 
     def _report(self, kind: Any, stage: str = "", **details: Any) -> None:
@@ -177,10 +180,16 @@ def stage_keys(
                 "room": room,
                 "redraw": stage.redraw(rejected, config.redraw),
                 "upstream": {name: keys[name] for name in stage.needs},
-                "scripts": scripts_sha256(stage.scripts),
+                "scripts": _scripts_once(stage.scripts),
             }
         )
     return keys
+
+
+@lru_cache
+def _scripts_once(entries: tuple[str, ...]) -> str:
+    """The scripts as this process first saw them, so that keys do not change under a run, and cost is paid once."""
+    return scripts_sha256(entries)
 
 
 def rejected_draws(layout: OutputLayout, config: Config, stages: tuple[Stage, ...] = STAGES) -> int:

@@ -119,8 +119,9 @@ def _settings(*names: str) -> Callable[[Config], dict[str, Any]]:
 
     def pick(config: Config) -> dict[str, Any]:
         picked: dict[str, Any] = {}
+        settings = config.model_dump(mode="json")
         for name in names:
-            value: Any = config.model_dump(mode="json")
+            value: Any = settings
             for part in name.split("."):
                 value = value[part]
             picked[name] = value

@@ -92,6 +92,16 @@ def test_changed_setting_recomputes_its_stage_and_what_lies_downstream(tmp_path:
     assert ran == {"room": 2, "export": 2, "audit": 3}
 
 
+def test_picture_of_a_replaced_sequence_is_removed(tmp_path: Path) -> None:
+    layout = _run(tmp_path, Counter())
+    layout.contact_sheet.parent.mkdir()
+    layout.contact_sheet.write_text("old")
+    _run(tmp_path, Counter())
+    assert layout.contact_sheet.exists()
+    _run(tmp_path, Counter(), Config.model_validate({"audit": {"reprojection_px": 0.5}}))
+    assert not layout.contact_sheet.exists()
+
+
 def test_damaged_stage_is_computed_again(tmp_path: Path) -> None:
     ran: RunCount = Counter()
     layout = _run(tmp_path, ran, until="export")
