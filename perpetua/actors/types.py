@@ -17,13 +17,38 @@ BODY_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17
 CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
 
 
+# How fast a person goes, from slowest to fastest.
+PACES = ("stand", "stroll", "walk", "brisk", "jog")
+
+
+@dataclass(frozen=True)
+class Dwell:
+    """A pause on a route, from ``first_frame`` to ``last_frame``, both included.
+
+    ``purpose`` is "look" (at ``target_m``), "stand" (at a table, ``target_m`` on it) or "sit" (the route stands in
+    front of the seat with its back to it; ``target_m`` is the middle of the seat). ``object_index`` is what it is
+    about; None for nothing in particular.
+    """
+
+    first_frame: int
+    last_frame: int
+    purpose: str
+    object_index: int | None
+    target_m: tuple[float, float, float]
+
+
 @dataclass(frozen=True)
 class Route:
-    """Where one actor's body axis goes: ``position_m`` on the floor, ``heading_rad`` about Z (0 faces +X)."""
+    """Where one actor's body axis goes: ``position_m`` on the floor, ``heading_rad`` about Z (0 faces +X).
+
+    ``description`` is what the actor does on it, in plain words; ``dwells`` its pauses, in order.
+    """
 
     actor: int
     position_m: Float64[np.ndarray, "T 3"]
     heading_rad: Float64[np.ndarray, " T"]
+    description: str = "walks"
+    dwells: tuple[Dwell, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -31,7 +56,9 @@ class BodyMotion:
     """Full-body motion in the world.
 
     ``world_from_joint`` holds global rotations of ``BODY_JOINTS``. In the rest pose (all identity) the body stands
-    in a T-pose facing +X with +Y to its left and +Z up. ``contacts`` follows ``CONTACTS``.
+    in a T-pose facing +X with +Y to its left and +Z up. ``contacts`` follows ``CONTACTS``. ``finger_from_parent``
+    holds rotations of SMPL-X's 30 finger joints (15 left, then 15 right) relative to their parents, identity for a
+    flat hand in the rest pose; None leaves the hands relaxed.
     """
 
     actor: int
@@ -39,6 +66,7 @@ class BodyMotion:
     world_from_joint: Float64[np.ndarray, "T 22 3 3"]
     pelvis_m: Float64[np.ndarray, "T 3"]
     contacts: Bool[np.ndarray, "T 4"]
+    finger_from_parent: Float64[np.ndarray, "T 30 3 3"] | None = None
 
 
 @dataclass(frozen=True)

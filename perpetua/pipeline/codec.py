@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from perpetua.actors.types import ActorMesh, ActorPart, BodyMotion, Route
+from perpetua.actors.types import ActorMesh, ActorPart, BodyMotion, Dwell, Route
 from perpetua.cameras.types import CameraPath
 from perpetua.errors import PerpetuaError
 from perpetua.geometry.mesh import TriMesh
@@ -29,7 +29,7 @@ OWN_FILE_BYTES = 1 << 20
 STORED_TYPES = {
     stored.__name__: stored
     for stored in (
-        ActorMesh, ActorPart, AreaLight, BodyMotion, CameraPath, Intrinsics, Material, NavGrid, PointTracks,
+        ActorMesh, ActorPart, AreaLight, BodyMotion, CameraPath, Dwell, Intrinsics, Material, NavGrid, PointTracks,
         RenderedView, Room, Route, SceneObject, SequenceTracks, TriMesh, ViewTracks,
     )
 }  # fmt: skip

@@ -8,8 +8,9 @@ from typing import Any, TypeVar
 
 from perpetua.actors.assembly import assemble_actors, draw_bodies
 from perpetua.actors.bodies.source import Body
+from perpetua.actors.casting import action_descriptions
 from perpetua.actors.config import ActorsConfig
-from perpetua.actors.motion.plan import action_descriptions, make_motions
+from perpetua.actors.motion.plan import make_motions
 from perpetua.actors.routes import plan_routes
 from perpetua.actors.types import ActorMesh, BodyMotion, Route
 from perpetua.actors.validation import validate_actors
@@ -154,16 +155,18 @@ def _draw_bodies_once(actors_json: str, seed: int, room: int) -> tuple[Body, ...
     return draw_bodies(ActorsConfig.model_validate_json(actors_json), StageSeed(seed, room, "bodies"))
 
 
-def _motion_settings(config: Config) -> dict[str, Any]:
+def _route_settings(config: Config) -> dict[str, Any]:
     """The list of actions counts by what it says, not by its name."""
     descriptions = list(action_descriptions(config.actors.motion))
-    return {**_settings("actors", _FPS)(config), "descriptions": descriptions}
+    return {**_settings("actors.count", "actors.routes", _FRAMES, _FPS)(config), "descriptions": descriptions}
 
 
 def _motion(context: StageContext) -> tuple[BodyMotion, ...]:
     skeletons = tuple(body.skeleton for body in _bodies(context))
     routes = context.many("routes", Route)
-    return make_motions(routes, skeletons, context.config.sequence.fps, context.config.actors.motion, context.seed)
+    config = context.config
+    room = context.one("room", Room)
+    return make_motions(routes, skeletons, room, config.sequence.fps, config.actors.motion, context.seed)
 
 
 def _actors(context: StageContext) -> tuple[ActorMesh, ...]:
@@ -270,11 +273,11 @@ STAGES = (
         "routes",
         1,
         ("room", "navigation"),
-        _settings("actors.count", "actors.routes", _FRAMES, _FPS),
+        _route_settings,
         _routes,
         redraw=_every_time,
     ),
-    Stage(40, "motion", 1, ("routes",), _motion_settings, _motion),
+    Stage(40, "motion", 1, ("room", "routes"), _settings("actors", _FPS), _motion),
     Stage(50, "actors", 1, ("room", "routes", "motion"), _settings("actors", _FPS), _actors),
     Stage(
         60,

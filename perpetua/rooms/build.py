@@ -11,7 +11,7 @@ from perpetua.navigation.config import NavigationConfig
 from perpetua.rooms import infinigen, procedural  # noqa: F401
 from perpetua.rooms.acceptance import RoomRejected, check_room
 from perpetua.rooms.config import RoomsConfig
-from perpetua.rooms.source import ROOM_SOURCES
+from perpetua.rooms.source import ROOM_SOURCES, draw_wish
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 
@@ -29,7 +29,8 @@ def build_room(config: RoomsConfig, navigation: NavigationConfig, seed: StageSee
     reasons: Counter[str] = Counter()
     for attempt in range(config.max_redraws + 1):
         try:
-            room = source.make(kind, config, seed, attempt, scratch)
+            wish = draw_wish(kind, config, seed.stream("wish", attempt))
+            room = source.make(wish, config, seed, attempt, scratch)
             check_room(room, config, navigation)
             return room
         except RoomRejected as rejection:

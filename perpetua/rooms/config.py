@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from perpetua.config_base import Section
 
 RoomKind = Literal["bathroom", "bedroom", "diningroom", "kitchen", "livingroom"]
+Daytime = Literal["day", "evening", "night"]
 
 
 class RoomsConfig(Section):
@@ -24,6 +25,12 @@ class RoomsConfig(Section):
     max_side_m: float = Field(7.0, ge=3.0, le=15.0, description="longest side of the floor, metres")
     min_height_m: float = Field(2.5, ge=2.2, le=5.0, description="lowest ceiling, metres")
     max_height_m: float = Field(3.1, ge=2.2, le=6.0, description="highest ceiling, metres")
+    daytimes: tuple[Daytime, ...] = Field(
+        ("day", "day", "evening", "night"), description="times of day to draw from", min_length=1
+    )
+    lamps: Literal["drawn", "on", "off"] = Field(
+        "drawn", description="lamps by day: on, off, or drawn; in the evening and at night 'drawn' means on"
+    )
     min_free_floor_m2: float = Field(
         6.0, ge=1.0, le=200.0, description="least connected floor that a person can walk on, square metres"
     )

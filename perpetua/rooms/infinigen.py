@@ -13,7 +13,7 @@ from perpetua.errors import EnvironmentSetupError
 from perpetua.geometry.mesh import TriMesh
 from perpetua.rooms.acceptance import RoomRejected
 from perpetua.rooms.config import RoomKind, RoomsConfig
-from perpetua.rooms.source import ROOM_SOURCES
+from perpetua.rooms.source import ROOM_SOURCES, RoomWish
 from perpetua.rooms.types import Room, SceneObject
 from perpetua.seeding import StageSeed
 
@@ -26,8 +26,8 @@ SIDE_SCALE: dict[RoomKind, float] = {"bathroom": 0.8}
 class InfinigenRooms:
     """Furnished rooms by Infinigen Indoors 2 (https://infinigen.org)."""
 
-    def make(self, kind: RoomKind, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
-        """A room of the kind, with its ``room.blend`` in ``scratch``.
+    def make(self, wish: RoomWish, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
+        """A room as wished, with its ``room.blend`` in ``scratch``.
 
         Raises:
             EnvironmentSetupError: Infinigen 2 is not installed.
@@ -38,14 +38,13 @@ class InfinigenRooms:
                 "rooms.source 'infinigen' needs the package infinigen2, which is not installed: run "
                 "pip install 'perpetua[infinigen]', or choose rooms.source=procedural"
             )
-        rng = seed.stream("infinigen", attempt)
         folder = scratch.resolve() / "infinigen"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         job = {
-            "kind": kind,
-            "seed": int(rng.integers(2**31)),
-            "dimensions_m": draw_dimensions_m(kind, config, rng),
+            "kind": wish.kind,
+            "seed": int(seed.stream("infinigen", attempt).integers(2**31)),
+            "dimensions_m": dimensions_m(wish),
             "folder": str(folder),
         }
         (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
@@ -56,11 +55,11 @@ class InfinigenRooms:
         return room
 
 
-def draw_dimensions_m(kind: RoomKind, config: RoomsConfig, rng: np.random.Generator) -> list[float]:
-    """Sides along x and y and height of a room, metres, to the centimetre."""
-    sides_m = SIDE_SCALE.get(kind, 1.0) * rng.uniform(config.min_side_m, config.max_side_m, size=2)
-    height_m = rng.uniform(config.min_height_m, config.max_height_m)
-    return [round(float(length_m), 2) for length_m in (*sides_m, height_m)]
+def dimensions_m(wish: RoomWish) -> list[float]:
+    """Sides along x and y and height that Infinigen is asked for, metres, to the centimetre."""
+    x_m, y_m, height_m = wish.size_m
+    scale = SIDE_SCALE.get(wish.kind, 1.0)
+    return [round(scale * x_m, 2), round(scale * y_m, 2), height_m]
 
 
 def read_room(folder: Path, blend_path: Path | None = None) -> Room:

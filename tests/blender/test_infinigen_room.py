@@ -14,6 +14,7 @@ from perpetua.navigation.grid import build_nav_grid
 from perpetua.rooms.acceptance import check_room
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.infinigen import InfinigenRooms
+from perpetua.rooms.source import RoomWish
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 
@@ -21,6 +22,7 @@ pytestmark = [pytest.mark.blender, pytest.mark.infinigen, pytest.mark.slow]
 
 CONFIG = RoomsConfig(kinds=("bathroom",), min_side_m=5.0, max_side_m=6.0)
 SEED = StageSeed(4, 0, "room")
+WISH = RoomWish("bathroom", (6.2, 6.6, 2.8), "day", True)
 
 # Opens a .blend as the render stage does, and says what is in it.
 INSPECT = """
@@ -74,7 +76,7 @@ def _mesh_hash(room: Room) -> str:
 def rooms(tmp_path_factory: pytest.TempPathFactory) -> tuple[Room, Room]:
     """The same seed in two processes and two folders."""
     first, second = (
-        InfinigenRooms().make("bathroom", CONFIG, SEED, 0, tmp_path_factory.mktemp(name)) for name in ("a", "bb")
+        InfinigenRooms().make(WISH, CONFIG, SEED, 0, tmp_path_factory.mktemp(name)) for name in ("a", "bb")
     )
     return first, second
 

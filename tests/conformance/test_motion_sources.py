@@ -1,6 +1,7 @@
 """What every motion source keeps, on every kind of route and at every frame rate."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 
-from motion_samples import ROUTE_KINDS, sample_route, sample_skeleton
+from motion_samples import ROUTE_KINDS, empty_room, sample_route, sample_skeleton
 
 from perpetua.actors.config import MotionConfig
 from perpetua.actors.motion import MOTION_SOURCES
@@ -18,13 +19,15 @@ from perpetua.seeding import StageSeed
 
 SEED = StageSeed(11, 2, "motion")
 SKELETON = sample_skeleton()
+ROOM = empty_room()
 sources = pytest.mark.parametrize("source", list(MOTION_SOURCES))
 kinds = pytest.mark.parametrize("kind", ROUTE_KINDS)
 rates = pytest.mark.parametrize("fps", [12.0, 24.0, 30.0])
 
 
 def _make(source: str, route: Route, fps: float, action: str = "walks") -> BodyMotion:
-    return MOTION_SOURCES[source]().make(route, SKELETON, action, fps, MotionConfig(source=source), SEED)
+    told = replace(route, description=action)
+    return MOTION_SOURCES[source]().make(told, SKELETON, ROOM, fps, MotionConfig(source=source), SEED)
 
 
 @sources
@@ -100,7 +103,7 @@ def test_the_same_arguments_give_the_same_bits_and_other_seeds_another_motion(so
     assert first.world_from_joint.tobytes() == again.world_from_joint.tobytes()
     assert first.pelvis_m.tobytes() == again.pelvis_m.tobytes()
     other = MOTION_SOURCES[source]().make(
-        route, SKELETON, "walks", 24.0, MotionConfig(source=source), StageSeed(12, 2, "motion")
+        route, SKELETON, ROOM, 24.0, MotionConfig(source=source), StageSeed(12, 2, "motion")
     )
     assert (first.contacts != other.contacts).any()
 

@@ -12,7 +12,7 @@ from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
 from perpetua.rooms.build import build_room
 from perpetua.rooms.config import RoomKind, RoomsConfig
-from perpetua.rooms.source import ROOM_SOURCES
+from perpetua.rooms.source import ROOM_SOURCES, draw_wish
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 
@@ -126,6 +126,9 @@ def test_same_seed_same_room(made: Made, tmp_path: Path) -> None:
 def test_another_attempt_is_another_room(source: str, tmp_path: Path) -> None:
     # A Blender source takes a minute per draw; its own tests show that the attempt reaches its job.
     first, other = (
-        ROOM_SOURCES[source]().make("kitchen", RoomsConfig(), SEED, attempt, tmp_path) for attempt in (0, 1)
+        ROOM_SOURCES[source]().make(
+            draw_wish("kitchen", RoomsConfig(), SEED.stream("wish", attempt)), RoomsConfig(), SEED, attempt, tmp_path
+        )
+        for attempt in (0, 1)
     )
     assert not np.array_equal(first.floor_polygon_m, other.floor_polygon_m)

@@ -3,6 +3,8 @@
 import numpy as np
 
 from perpetua.actors.types import BODY_JOINTS, Route, Skeleton
+from perpetua.geometry.mesh import TriMesh
+from perpetua.rooms.types import Material, Room, SceneObject
 
 # Left half of a body of 1.7 m, metres.
 _JOINTS = {
@@ -22,6 +24,14 @@ _JOINTS = {
     "left_wrist": (-0.01, 0.67, 1.37),
 }
 ROUTE_KINDS = ("stand", "straight", "curve", "spot", "slow", "brisk", "sideways", "backwards", "oblique", "random")
+
+
+def empty_room() -> Room:
+    """A bare floor of 40 by 40 metres."""
+    corners_m = np.array([[-20.0, -20.0, 0.0], [20.0, -20.0, 0.0], [20.0, 20.0, 0.0], [-20.0, 20.0, 0.0]])
+    mesh = TriMesh(corners_m, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    floor = SceneObject(1, "floor", "floor", mesh, Material("grey", (0.5, 0.5, 0.5)), True, True)
+    return Room("empty", "livingroom", corners_m[:, :2].copy(), 2.8, (floor,), (), None)
 
 
 def sample_skeleton(height_m: float = 1.7) -> Skeleton:

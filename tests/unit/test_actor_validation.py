@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from jaxtyping import Float64
-from motion_samples import sample_route, sample_skeleton
+from motion_samples import empty_room, sample_route, sample_skeleton
 from synthetic_scene import GREY, box, tri
 
 from perpetua.actors.config import MotionConfig, ValidationConfig
@@ -67,7 +67,7 @@ def _room(*furniture: tuple[str, trimesh.Trimesh]) -> Room:
 def _walker(actor: int, y_m: float = 0.0) -> tuple[ActorMesh, BodyMotion, Route]:
     route = sample_route("straight", FPS, 5.0, actor)
     route = Route(actor, route.position_m + np.array([0.0, y_m, 0.0]), route.heading_rad)
-    motion = ProceduralMotion().make(route, SKELETON, "walks", FPS, MotionConfig(), StageSeed(2, 0, "motion"))
+    motion = ProceduralMotion().make(route, SKELETON, empty_room(), FPS, MotionConfig(), StageSeed(2, 0, "motion"))
     return _tubes(SKELETON, motion, actor), motion, route
 
 

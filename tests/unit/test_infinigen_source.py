@@ -15,12 +15,19 @@ from perpetua.navigation.config import NavigationConfig
 from perpetua.rooms import infinigen
 from perpetua.rooms.acceptance import RoomRejected
 from perpetua.rooms.build import build_room
-from perpetua.rooms.config import RoomsConfig
-from perpetua.rooms.infinigen import InfinigenRooms, draw_dimensions_m
+from perpetua.rooms.config import RoomKind, RoomsConfig
+from perpetua.rooms.infinigen import InfinigenRooms, dimensions_m
+from perpetua.rooms.source import RoomWish, draw_wish
 from perpetua.seeding import StageSeed
 
 SEED = StageSeed(7, 0, "room")
 CONFIG = RoomsConfig(timeout_s=10.0)
+
+
+def wish(kind: RoomKind) -> RoomWish:
+    """A room of the middle size, by day."""
+    return RoomWish(kind, (6.0, 6.0, 2.8), "day", True)
+
 
 # A tetrahedron and a square floor, written as the Blender script writes them.
 WRITE_ROOM = """
@@ -91,18 +98,17 @@ def test_names_become_plain_nouns(name: str, category: str) -> None:
 
 def test_dimensions_stay_in_their_limits_and_follow_the_seed() -> None:
     config = RoomsConfig(min_side_m=5.0, max_side_m=6.0, min_height_m=2.5, max_height_m=2.7)
-    draws = [
-        draw_dimensions_m("kitchen", config, StageSeed(7, room, "room").stream("infinigen", 0)) for room in range(200)
-    ]
+    draws = [draw_wish("kitchen", config, StageSeed(7, room, "room").stream("wish", 0)).size_m for room in range(200)]
     low, high = np.min(draws, axis=0), np.max(draws, axis=0)
     assert (low >= [5.0, 5.0, 2.5]).all() and (high <= [6.0, 6.0, 2.7]).all()
     assert (high - low > [0.9, 0.9, 0.18]).all()
-    assert draws[3] == draw_dimensions_m("kitchen", config, StageSeed(7, 3, "room").stream("infinigen", 0))
+    assert draws[3] == draw_wish("kitchen", config, StageSeed(7, 3, "room").stream("wish", 0)).size_m
+    assert dimensions_m(RoomWish("bathroom", (5.0, 6.0, 2.6), "day", True)) == [4.0, 4.8, 2.6]
 
 
 def test_the_room_comes_back_as_the_script_wrote_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     _use_script(monkeypatch, tmp_path, WRITE_ROOM)
-    room = InfinigenRooms().make("bedroom", CONFIG, SEED, 0, tmp_path)
+    room = InfinigenRooms().make(wish("bedroom"), CONFIG, SEED, 0, tmp_path)
     assert [(thing.object_index, thing.category, thing.walkable) for thing in room.objects] == [
         (1, "bed", False),
         (2, "floor", True),
@@ -123,7 +129,7 @@ def test_the_job_depends_on_seed_and_attempt_alone(monkeypatch: pytest.MonkeyPat
     def job(folder: str, seed: StageSeed, attempt: int) -> dict[str, object]:
         scratch = tmp_path / folder
         scratch.mkdir()
-        room = InfinigenRooms().make("bedroom", CONFIG, seed, attempt, scratch)
+        room = InfinigenRooms().make(wish("bedroom"), CONFIG, seed, attempt, scratch)
         assert room.blend_path is not None
         asked = json.loads(room.blend_path.read_text())
         return {key: asked[key] for key in ("kind", "seed", "dimensions_m")}
@@ -137,7 +143,7 @@ def test_the_job_depends_on_seed_and_attempt_alone(monkeypatch: pytest.MonkeyPat
 def test_a_crash_is_a_rejection_with_the_last_lines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     _use_script(monkeypatch, tmp_path, "raise ValueError('no place for the bathtub')")
     with pytest.raises(RoomRejected, match="no place for the bathtub") as rejection:
-        InfinigenRooms().make("bathroom", CONFIG, SEED, 0, tmp_path)
+        InfinigenRooms().make(wish("bathroom"), CONFIG, SEED, 0, tmp_path)
     assert rejection.value.rule == "crash"
 
 
@@ -145,7 +151,7 @@ def test_a_hanging_generator_is_stopped(monkeypatch: pytest.MonkeyPatch, tmp_pat
     _use_script(monkeypatch, tmp_path, "import time; time.sleep(60)")
     begin = time.monotonic()
     with pytest.raises(RoomRejected, match=r"rooms\.timeout_s = 1 ") as rejection:
-        InfinigenRooms().make("kitchen", CONFIG.model_copy(update={"timeout_s": 1.0}), SEED, 0, tmp_path)
+        InfinigenRooms().make(wish("kitchen"), CONFIG.model_copy(update={"timeout_s": 1.0}), SEED, 0, tmp_path)
     assert rejection.value.rule == "timeout"
     assert time.monotonic() - begin < 20.0
 
@@ -153,7 +159,7 @@ def test_a_hanging_generator_is_stopped(monkeypatch: pytest.MonkeyPatch, tmp_pat
 def test_missing_infinigen_names_the_extra(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "infinigen2", None)
     with pytest.raises(EnvironmentSetupError, match=r"perpetua\[infinigen\]"):
-        InfinigenRooms().make("kitchen", CONFIG, SEED, 0, tmp_path)
+        InfinigenRooms().make(wish("kitchen"), CONFIG, SEED, 0, tmp_path)
 
 
 def test_redraws_are_counted_by_reason(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -3,11 +3,12 @@
 import logging
 
 import pytest
-from motion_samples import sample_route, sample_skeleton
+from motion_samples import empty_room, sample_route, sample_skeleton
 
+from perpetua.actors.casting import draw_descriptions
 from perpetua.actors.config import MotionConfig
 from perpetua.actors.motion.actions import known_actions, perform
-from perpetua.actors.motion.plan import draw_actions, make_motions
+from perpetua.actors.motion.plan import make_motions
 from perpetua.errors import ConfigError
 from perpetua.seeding import StageSeed
 
@@ -38,23 +39,24 @@ def test_words_without_meaning_warn_with_the_nearest_known_and_walk(caplog: pyte
 
 
 def test_actions_are_drawn_without_repeats_and_all_are_understood(caplog: pytest.LogCaptureFixture) -> None:
-    drawn = draw_actions(tuple(range(8)), MotionConfig(), SEED)
+    drawn = draw_descriptions(8, MotionConfig(), SEED)
     assert len(set(drawn)) == 8
-    assert drawn[:4] == draw_actions((0, 1, 2, 3), MotionConfig(), SEED)
-    assert any(drawn != draw_actions(tuple(range(8)), MotionConfig(), StageSeed(room, 1, "m")) for room in range(3))
-    for actor in range(200):
-        perform(draw_actions((actor,), MotionConfig(), SEED)[0])
+    assert drawn[:4] == draw_descriptions(4, MotionConfig(), SEED)
+    assert any(drawn != draw_descriptions(8, MotionConfig(), StageSeed(room, 1, "m")) for room in range(3))
+    for description in draw_descriptions(200, MotionConfig(), SEED):
+        perform(description)
     assert not caplog.records
 
 
 def test_a_list_that_does_not_exist_is_named() -> None:
     with pytest.raises(ConfigError, match=r"actors.motion.actions must be one of \[.*everyday.*\], not 'dance'"):
-        draw_actions((0,), MotionConfig(actions="dance"), SEED)
+        draw_descriptions(1, MotionConfig(actions="dance"), SEED)
 
 
 def test_make_motions_gives_each_actor_a_motion_of_its_own() -> None:
     routes = tuple(sample_route("straight", 12.0, 3.0, actor) for actor in range(2))
-    config = MotionConfig(descriptions=("walks",))
-    first, second = make_motions(routes, (sample_skeleton(), sample_skeleton()), 12.0, config, SEED)
+    first, second = make_motions(
+        routes, (sample_skeleton(), sample_skeleton()), empty_room(), 12.0, MotionConfig(), SEED
+    )
     assert (first.actor, second.actor) == (0, 1)
     assert (first.contacts != second.contacts).any(), "two actors walk in step"

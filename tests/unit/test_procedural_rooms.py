@@ -17,6 +17,7 @@ from perpetua.rooms.procedural.palette import sample_palette
 from perpetua.rooms.procedural.parts import bar, block, folds, lathe
 from perpetua.rooms.procedural.plan import DETAILS, Piece, RoomPlan
 from perpetua.rooms.procedural.sampling import sample_room
+from perpetua.rooms.source import RoomWish, draw_wish
 from perpetua.seeding import StageSeed
 
 CONFIG = RoomsConfig()
@@ -24,8 +25,12 @@ KINDS: tuple[RoomKind, ...] = ("bathroom", "bedroom", "diningroom", "kitchen", "
 SEEDS = range(2)
 
 
+def wish(kind: RoomKind, seed: int) -> RoomWish:
+    return draw_wish(kind, CONFIG, StageSeed(seed, 0, "room").stream("wish"))
+
+
 def plan_of(kind: RoomKind, seed: int) -> RoomPlan:
-    plan = sample_room(StageSeed(seed, 0, "room").stream("test"), kind, CONFIG)
+    plan = sample_room(StageSeed(seed, 0, "room").stream("test"), wish(kind, seed))
     assert plan is not None
     return plan
 
@@ -101,7 +106,7 @@ def test_piece_is_solid_and_fills_its_box(category: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_default_rooms_are_acceptable(kind: RoomKind) -> None:
-    room = ProceduralRooms().make(kind, CONFIG, StageSeed(11, 0, "room"), 0, Path())
+    room = ProceduralRooms().make(wish(kind, 11), CONFIG, StageSeed(11, 0, "room"), 0, Path())
     check_room(room, CONFIG, NavigationConfig(cell_m=0.1))
     assert len({thing.category for thing in room.objects if thing.category not in ("floor", "wall", "ceiling")}) >= 8
     assert any(light.direction == (0.0, 0.0, -1.0) for light in room.lights)
@@ -110,13 +115,13 @@ def test_default_rooms_are_acceptable(kind: RoomKind) -> None:
 
 def test_room_too_small_for_its_furniture_is_rejected() -> None:
     with pytest.raises(RoomRejected, match="does not fit"):
-        tiny = RoomsConfig.model_construct(min_side_m=2.7, max_side_m=2.7)
-        ProceduralRooms().make("diningroom", tiny, StageSeed(0, 0, "room"), 0, Path())
+        tiny = RoomWish("diningroom", (2.7, 2.7, 2.6), "day", True)
+        ProceduralRooms().make(tiny, CONFIG, StageSeed(0, 0, "room"), 0, Path())
 
 
 def test_walls_are_open_at_windows_and_closed_elsewhere() -> None:
     plan = plan_of("livingroom", 0)
-    room = ProceduralRooms().make("livingroom", CONFIG, StageSeed(0, 0, "room"), 0, Path())
+    room = ProceduralRooms().make(wish("livingroom", 0), CONFIG, StageSeed(0, 0, "room"), 0, Path())
     walls = [thing.mesh for thing in room.objects if thing.category == "wall"]
     inside_m2 = sum(trimesh.Trimesh(mesh.vertices_m, mesh.faces, process=False).volume for mesh in walls)
     x, y = np.ptp(room.floor_polygon_m, axis=0)

@@ -22,6 +22,7 @@ from perpetua.actors.motion.source import MOTION_SOURCES
 from perpetua.actors.motion.style import GaitStyle, draw_gait_style
 from perpetua.actors.motion.trunk import Trunk, make_trunk, spine_between
 from perpetua.actors.types import BODY_JOINTS, BodyMotion, Route, Skeleton
+from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 
 _FINE_HZ = 120.0
@@ -55,12 +56,12 @@ class ProceduralMotion:
     """Walks, strolls, turns and stands along any route, with arms posed by words."""
 
     def make(
-        self, route: Route, skeleton: Skeleton, action: str, fps: float, config: MotionConfig, seed: StageSeed
+        self, route: Route, skeleton: Skeleton, room: Room, fps: float, config: MotionConfig, seed: StageSeed
     ) -> BodyMotion:
         """See ``MotionSource.make``."""
         hip_m = bone(skeleton, "right_hip", "left_hip")
         style = draw_gait_style(seed.stream("style", route.actor), 0.5 * float(hip_m[1]))
-        walker = _Walker(skeleton, style, perform(action), RoutePath(route, fps))
+        walker = _Walker(skeleton, style, perform(route.description), RoutePath(route, fps))
         clock = _clock(len(route.heading_rad), fps)
         feet = _feet(walker, seed.stream("steps", route.actor), clock)
         trunk = _trunk(walker, feet, clock)

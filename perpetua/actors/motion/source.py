@@ -5,6 +5,7 @@ from typing import Protocol
 from perpetua.actors.config import MotionConfig
 from perpetua.actors.types import BodyMotion, Route, Skeleton
 from perpetua.registry import Registry
+from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 
 
@@ -12,14 +13,14 @@ class MotionSource(Protocol):
     """Makes full-body motion along a route; the same arguments give the same motion, bit for bit."""
 
     def make(
-        self, route: Route, skeleton: Skeleton, action: str, fps: float, config: MotionConfig, seed: StageSeed
+        self, route: Route, skeleton: Skeleton, room: Room, fps: float, config: MotionConfig, seed: StageSeed
     ) -> BodyMotion:
         """Motion of one actor, one frame per frame of the route.
 
         Args:
-            route: the floor path of the body's axis and its heading.
+            route: the floor path of the body's axis, its heading, what the actor does in plain words, its pauses.
             skeleton: the bones of the body that will carry the motion.
-            action: what the actor does, in plain words.
+            room: what the actor moves in: the floor under its feet, seats to sit on.
             fps: frames per second of the route.
             config: the motion section of the config.
             seed: all randomness comes from ``seed.stream(..., route.actor)``.

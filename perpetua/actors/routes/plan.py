@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 from jaxtyping import Float64
 
+from perpetua.actors.casting import draw_descriptions
 from perpetua.actors.config import ActorsConfig, RoutesConfig
 from perpetua.actors.routes.checks import TimedPaths, Violation, find_violations
 from perpetua.actors.routes.optimise import optimise_paths
@@ -41,7 +42,7 @@ def plan_routes(
         config: number of actors, limits, weights.
         frames: frames of each route.
         fps: frames per second.
-        seed: all randomness comes from ``seed.stream("walk", actor, attempt)``.
+        seed: all randomness comes from ``seed.stream("walk", actor, attempt)`` and ``seed.stream("actions")``.
 
     Raises:
         RouteError: ``config.routes.max_redraws`` further walks did not help.
@@ -50,7 +51,10 @@ def plan_routes(
     step_s = 1.0 / (fps * refinement)
     steps = max((frames - 1) * refinement + 1, math.ceil(MIN_SECONDS / step_s))
     paths = _feasible_paths(room, grid, config, steps, step_s, refinement, seed)
-    return tuple(_route(actor, paths, grid, frames, refinement) for actor in range(config.count))
+    descriptions = draw_descriptions(config.count, config.motion, seed)
+    return tuple(
+        _route(actor, paths, grid, frames, refinement, description) for actor, description in enumerate(descriptions)
+    )
 
 
 def _feasible_paths(
@@ -130,12 +134,12 @@ def _stillness(walk: Walk, step_s: float, walk_speed_mps: float) -> float:
     return max(0.0, 1.0 - float(travelled_m) / (walk_speed_mps * step_s * len(walk.position_m)))
 
 
-def _route(actor: int, paths: TimedPaths, grid: NavGrid, frames: int, refinement: int) -> Route:
+def _route(actor: int, paths: TimedPaths, grid: NavGrid, frames: int, refinement: int, description: str) -> Route:
     position_m = paths.position_m[actor, ::refinement][:frames]
     cells = np.round((position_m - grid.origin_m) / grid.cell_m).astype(int)
     floor_z_m = grid.floor_z_m[cells[:, 0], cells[:, 1]].astype(np.float64)
     heading_rad = paths.heading_rad[actor, ::refinement][:frames].copy()
-    return Route(actor, np.column_stack([position_m, floor_z_m]), heading_rad)
+    return Route(actor, np.column_stack([position_m, floor_z_m]), heading_rad, description)
 
 
 def _explain(violation: Violation, room: Room, refinement: int) -> str:

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from perpetua.rooms.acceptance import RoomRejected
-from perpetua.rooms.config import RoomKind, RoomsConfig
+from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.procedural.building import build_room
 from perpetua.rooms.procedural.sampling import sample_room
-from perpetua.rooms.source import ROOM_SOURCES
+from perpetua.rooms.source import ROOM_SOURCES, RoomWish
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 
@@ -15,13 +15,13 @@ from perpetua.seeding import StageSeed
 class ProceduralRooms:
     """Draws a plan (sizes, openings, furniture, materials, light), then builds it."""
 
-    def make(self, kind: RoomKind, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
-        """A room of the kind; nothing is written to ``scratch``.
+    def make(self, wish: RoomWish, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
+        """A room as wished; nothing is written to ``scratch``.
 
         Raises:
             RoomRejected: the furniture that the kind needs does not fit into the drawn floor.
         """
-        plan = sample_room(seed.stream("procedural", attempt), kind, config)
+        plan = sample_room(seed.stream("procedural", attempt), wish)
         if plan is None:
-            raise RoomRejected("furniture", f"what a {kind} needs does not fit; raise rooms.min_side_m")
-        return build_room(plan, f"{kind}_{seed.room:06d}")
+            raise RoomRejected("furniture", f"what a {wish.kind} needs does not fit; raise rooms.min_side_m")
+        return build_room(plan, f"{wish.kind}_{seed.room:06d}")

@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from perpetua.rooms.config import RoomKind, RoomsConfig
+from perpetua.rooms.config import RoomKind
 from perpetua.rooms.procedural.kinds import furnish
 from perpetua.rooms.procedural.layout import Layout
 from perpetua.rooms.procedural.palette import sample_palette
 from perpetua.rooms.procedural.plan import DETAILS, Opening, Piece, RoomPlan, at_wall, wall_length_m
+from perpetua.rooms.source import RoomWish
 
 LAYOUTS = 8
 DOOR_WIDTH_M = 0.9
@@ -16,11 +17,9 @@ LARGE_ROOM_M2 = 30.0
 CEILING_LAMP_M = 0.55
 
 
-def sample_room(rng: np.random.Generator, kind: RoomKind, config: RoomsConfig) -> RoomPlan | None:
+def sample_room(rng: np.random.Generator, wish: RoomWish) -> RoomPlan | None:
     """The plan of a room; None if the furniture that its kind needs does not fit."""
-    low_m, high_m = config.min_side_m, max(config.min_side_m, config.max_side_m)
-    width_m, depth_m = (round(float(rng.uniform(low_m, high_m)), 2) for _ in range(2))
-    height_m = round(float(rng.uniform(2.5, 2.9)), 2)
+    kind, (width_m, depth_m, height_m) = wish.kind, wish.size_m
     walls = [int(wall) for wall in rng.permutation(4)]
     door = _sample_door(rng, walls[0], width_m, depth_m)
     count = 1 if kind == "bathroom" else int(rng.integers(1, 4))
@@ -35,7 +34,7 @@ def sample_room(rng: np.random.Generator, kind: RoomKind, config: RoomsConfig) -
     else:
         return None
     lamps = _ceiling_lamps(layout, height_m)
-    evening = float(rng.uniform()) < 0.25
+    evening = wish.daytime != "day"
     return RoomPlan(
         kind=kind,
         width_m=width_m,
