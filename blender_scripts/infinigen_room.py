@@ -4,7 +4,7 @@
 The job holds ``kind``, ``seed``, ``dimensions_m`` (x, y, height) and ``folder``, where these files go:
 
 - ``room.blend``: plain meshes with materials, lamps and sky; each object's pass index is its object index.
-- ``meshes.npz``: the triangles of all objects as rendered, one after the other (see ``_write_meshes``).
+- ``meshes.npz``: the triangles of all objects as rendered, one after the other (see ``write_meshes``).
 - ``room.json``: kind, size, and the table of objects.
 
 World: Z up, metres, origin on the floor under the middle of the room.
@@ -31,16 +31,13 @@ from plain_meshes import (
     unparent,
     world_triangles,
 )
+from room_output import MAX_SUN_W_M2, MIN_LAMP_W_M2, PANEL_LAMP_W_M2, add_panel, write_meshes
 from worker_link import Worker, read_job
 
 STRUCTURE = frozenset({"floor", "wall", "ceiling"})
 # Detail an object keeps: triangles per metre of its diagonal, within limits.
 TRIANGLES_PER_M = 10_000
 MIN_TRIANGLES, MAX_TRIANGLES = 1_000, 40_000
-# Direct sun beyond this (W/m2) leaves white patches in a picture that shows the room.
-MAX_SUN_W_M2 = 8.0
-# Lamp power per square metre of floor: below the first a room is dim; a ceiling panel then brings it to the second.
-MIN_LAMP_W_M2, PANEL_LAMP_W_M2 = 1.2, 2.2
 
 
 def main() -> None:
@@ -125,19 +122,7 @@ def _light(lamps: list[bpy.types.Object], dimensions_m: list[float]) -> None:
         elif not (lamp.data.type == "AREA" and lamp.data.cycles.is_portal):
             power_w += lamp.data.energy
     if power_w < MIN_LAMP_W_M2 * floor_m2:
-        _add_panel(PANEL_LAMP_W_M2 * floor_m2 - power_w, dimensions_m)
-
-
-def _add_panel(power_w: float, dimensions_m: list[float]) -> None:
-    panel = bpy.data.lights.new("ceiling_panel", "AREA")
-    panel.shape = "RECTANGLE"
-    panel.size, panel.size_y = 0.5 * dimensions_m[0], 0.5 * dimensions_m[1]
-    panel.energy = power_w
-    thing = bpy.data.objects.new("ceiling_panel", panel)
-    thing.location = (0.0, 0.0, dimensions_m[2] - 0.1)
-    # It stands for light from nowhere in particular, so it must not mirror in a polished floor.
-    thing.visible_glossy = thing.visible_camera = False
-    bpy.context.scene.collection.objects.link(thing)
+        add_panel(PANEL_LAMP_W_M2 * floor_m2 - power_w, dimensions_m)
 
 
 def _tidy(things: list[bpy.types.Object], categories: list[str]) -> None:
@@ -151,7 +136,7 @@ def _tidy(things: list[bpy.types.Object], categories: list[str]) -> None:
 
 
 def _write(folder: Path, job: dict, things: list[bpy.types.Object], categories: list[str]) -> None:
-    _write_meshes(folder / "meshes.npz", things)
+    write_meshes(folder / "meshes.npz", things)
     table = [
         {
             "object_index": thing.pass_index,
@@ -168,18 +153,6 @@ def _write(folder: Path, job: dict, things: list[bpy.types.Object], categories: 
     room = {"kind": job["kind"], "floor_polygon_m": corners, "height_m": height_m, "objects": table}
     (folder / "room.json").write_text(json.dumps(room, indent=1), encoding="utf-8")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "room.blend"), compress=True, relative_remap=False)
-
-
-def _write_meshes(path: Path, things: list[bpy.types.Object]) -> None:
-    """One array of all vertices and one of all triangles; ``*_start`` holds where each object's begin, and the end."""
-    meshes = [world_triangles(thing) for thing in things]
-    np.savez(
-        path,
-        vertices_m=np.concatenate([vertices_m for vertices_m, _ in meshes]),
-        faces=np.concatenate([faces for _, faces in meshes]),
-        vertex_start=np.cumsum([0] + [len(vertices_m) for vertices_m, _ in meshes]),
-        face_start=np.cumsum([0] + [len(faces) for _, faces in meshes]),
-    )
 
 
 if __name__ == "__main__":

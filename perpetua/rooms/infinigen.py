@@ -4,17 +4,14 @@ import importlib.util
 import json
 import shutil
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from perpetua.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.errors import EnvironmentSetupError
-from perpetua.geometry.mesh import TriMesh
 from perpetua.rooms.acceptance import RoomRejected
 from perpetua.rooms.config import RoomKind, RoomsConfig
+from perpetua.rooms.script_output import read_room
 from perpetua.rooms.source import ROOM_SOURCES, RoomWish
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 
 SCRIPT = SCRIPT_FOLDER / "infinigen_room.py"
@@ -50,7 +47,7 @@ class InfinigenRooms:
         (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
         _run_script(folder, config.timeout_s)
         (folder / "room.blend").replace(scratch / "room.blend")
-        room = read_room(folder, scratch / "room.blend")
+        room = read_room(folder, f"infinigen_{wish.kind}", scratch / "room.blend")
         shutil.rmtree(folder)
         return room
 
@@ -60,45 +57,6 @@ def dimensions_m(wish: RoomWish) -> list[float]:
     x_m, y_m, height_m = wish.size_m
     scale = SIDE_SCALE.get(wish.kind, 1.0)
     return [round(scale * x_m, 2), round(scale * y_m, 2), height_m]
-
-
-def read_room(folder: Path, blend_path: Path | None = None) -> Room:
-    """The room that the script left in a folder; ``blend_path`` is where its .blend is now."""
-    table = json.loads((folder / "room.json").read_text(encoding="utf-8"))
-    with np.load(folder / "meshes.npz", allow_pickle=False) as arrays:
-        vertices_m, faces = arrays["vertices_m"], arrays["faces"]
-        vertex_start, face_start = arrays["vertex_start"], arrays["face_start"]
-    objects = tuple(
-        _scene_object(
-            entry,
-            TriMesh(
-                vertices_m[vertex_start[k] : vertex_start[k + 1]].copy(),
-                faces[face_start[k] : face_start[k + 1]].copy(),
-            ),
-        )
-        for k, entry in enumerate(table["objects"])
-    )
-    return Room(
-        name=f"infinigen_{table['kind']}",
-        kind=table["kind"],
-        floor_polygon_m=np.array(table["floor_polygon_m"], np.float64),
-        height_m=table["height_m"],
-        objects=objects,
-        lights=(),
-        blend_path=folder / "room.blend" if blend_path is None else blend_path,
-    )
-
-
-def _scene_object(entry: dict[str, Any], mesh: TriMesh) -> SceneObject:
-    return SceneObject(
-        object_index=entry["object_index"],
-        name=entry["name"],
-        category=entry["category"],
-        mesh=mesh,
-        material=None,
-        walkable=entry["walkable"],
-        opaque=entry["opaque"],
-    )
 
 
 def _run_script(folder: Path, timeout_s: float) -> None:
