@@ -115,6 +115,18 @@ _ACTIONS: dict[str, _Action] = {
     ),
 }
 _GOING = _words("walk stroll go move pace wander step stride march amble saunter turn stand wait stop idle pause hurry")
+_PACE_VERBS = {
+    "stand": _words("stand wait idle halt"),
+    "stroll": _words("stroll amble saunter wander"),
+    "walk": _words("walk go pace march stride move"),
+    "brisk": _words("hurry rush"),
+    "jog": _words("jog run"),
+}
+_PACE_OF_MANNER = {
+    "brisk": "brisk", "quick": "brisk", "fast": "brisk", "hurried": "brisk",
+    "slow": "stroll", "tired": "stroll", "leisurely": "stroll",
+}  # fmt: skip
+_SITTING = _words("sit sits sitting seat")
 _MANNERS: dict[str, tuple[float, float]] = {
     # Forward lean in radians, arm swing as a factor.
     "brisk": (0.03, 1.25),
@@ -132,6 +144,30 @@ def known_actions() -> tuple[str, ...]:
     return tuple(_ACTIONS)
 
 
+def stated_paces(description: str) -> frozenset[str]:
+    """The paces of ``actors.types.PACES`` that a description states; empty where it says nothing of going or standing.
+
+    A word of manner outweighs the verb in its clause: "walks briskly" is brisk, "walks" is walk.
+    """
+    stated: set[str] = set()
+    for stems in _clauses(description):
+        manner = {pace for word, pace in _PACE_OF_MANNER.items() if _stem(word) in stems}
+        verb = {pace for pace, words in _PACE_VERBS.items() if stems & words}
+        stated |= manner if manner and (verb <= {"walk"}) else verb
+    return frozenset(stated)
+
+
+def wants_seat(description: str) -> bool:
+    """Whether a description asks for a place to sit."""
+    return any(stems & _SITTING for stems in _clauses(description))
+
+
+def _clauses(description: str) -> list[frozenset[str]]:
+    """The stems of the words of each clause."""
+    clauses = re.split(r"[,;.]|\band\b|\bwhile\b|\bthen\b", description.lower())
+    return [frozenset(_stem(word) for word in re.findall(r"[a-z]+", clause)) for clause in clauses]
+
+
 def perform(description: str) -> Performance:
     """What a description in plain words asks of the upper body.
 
@@ -139,8 +175,7 @@ def perform(description: str) -> Performance:
     """
     performance = Performance()
     understood = False
-    for clause in re.split(r"[,;.]|\band\b|\bwhile\b", description.lower()):
-        stems = frozenset(_stem(word) for word in re.findall(r"[a-z]+", clause))
+    for stems in _clauses(description):
         meant = [action for action in _ACTIONS.values() if stems & action.verbs and _mentions(stems, action)]
         manners = [effect for word, effect in _MANNERS.items() if _stem(word) in stems]
         understood = understood or bool(meant or manners or stems & _GOING)
