@@ -1,103 +1,148 @@
-"""A plan of a sequence from above: where people and cameras go, and what each camera sees."""
+"""A plan of a sequence from above, with the ways of people and cameras, and curves of how they move."""
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float64
-from PIL import Image, ImageDraw
+from jaxtyping import Float64
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 
-from perpetua.audit.drawing import BACKGROUND, INK, SMOOTH, Canvas, text_font, track_colour
 from perpetua.audit.geometry import camera_centre_m, moves_more_than
+from perpetua.files import read_json
+from perpetua.formats.layout import AUDIT
 from perpetua.formats.reader import Sequence, SequenceView, read_sequence
 
-SIZE_PX = 900
-BORDER_PX = 60
-FRUSTUM_M = 0.9
+FRUSTUM_M = 0.7
+FRUSTA = 5
 MOVING_M = 0.05
-CAMERA_COLOUR = (255, 255, 255)
+HEAD_ROOM_M = 2.2
+# What spreads over more of the floor is skirting, walls or the floor itself, and would hide the rest.
+STRUCTURE_SHARE = 0.6
+PEOPLE = ("tab:red", "tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:pink")
+CAMERAS = ("black", "darkorange", "teal", "crimson", "slateblue", "olive")
+# What is drawn of the audit's curves: title, curve, whether of people.
+CURVES = (
+    ("people: speed, m/s", "actor_speed_mps", True),
+    ("people: to furniture and walls, m", "actor_scene_m", True),
+    ("people: to each other, m", "actor_apart_m", True),
+    ("people: seen by so many views", "views_seeing", True),
+    ("cameras: speed, m/s", "camera_speed_mps", False),
+    ("cameras: to the scene, m", "camera_scene_m", False),
+    ("cameras: to people, m", "camera_actor_m", False),
+)
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """Maps world x, y in metres to pixels, north (+Y) up."""
+def write_plan_view(sequence_folder: Path, picture: Path) -> None:
+    """Writes a picture: room, routes with their pauses, camera paths with frusta over time, curves beside it.
 
-    low_m: Float64[np.ndarray, "2"]
-    scale_px: float
-    height_px: int
-
-    def __call__(self, world_m: Float[np.ndarray, "*batch 3"]) -> Float64[np.ndarray, "*batch 2"]:
-        place = (np.asarray(world_m, np.float64)[..., :2] - self.low_m) * self.scale_px + BORDER_PX
-        place[..., 1] = self.height_px - place[..., 1]
-        return place
-
-
-def write_plan_view(sequence_folder: Path, png: Path) -> None:
-    """Writes a PNG: still tracks as dots shaded by height, routes of moving objects, camera paths with frusta.
+    What a sequence does not record is left out: one that Perpetua did not make shows its tracks and cameras.
 
     Raises:
         SequenceFormatError: the sequence cannot be read.
     """
     sequence = read_sequence(sequence_folder)
-    centres_m = [np.stack([camera_centre_m(pose) for pose in view.camera_from_world]) for view in sequence.views]
-    moves = moves_more_than(sequence.tracks_m, MOVING_M)
-    everything_m = np.concatenate([sequence.tracks_m.reshape(-1, 3).astype(np.float64), *centres_m])[:, :2]
-    low_m, high_m = everything_m.min(axis=0), everything_m.max(axis=0)
-    scale_px = (SIZE_PX - 2 * BORDER_PX) / max(float((high_m - low_m).max()), 1e-3)
-    width_px, height_px = (np.ceil((high_m - low_m) * scale_px).astype(int) + 2 * BORDER_PX).tolist()
-    plan = _Plan(low_m, scale_px, height_px)
-    canvas = Canvas(np.full((height_px, width_px, 3), BACKGROUND, np.uint8))
-    _draw_still(canvas, plan, sequence.tracks_m[0, ~moves])
-    labels = _draw_routes(canvas, plan, sequence, np.flatnonzero(moves))
-    for index, (view, centre_m) in enumerate(zip(sequence.views, centres_m, strict=True)):
-        _draw_camera(canvas, plan, view, centre_m)
-        labels.append((plan(centre_m[0]), f"view {index}"))
-    _labelled(canvas.picture(), labels, plan).save(png)
-
-
-def _draw_still(canvas: Canvas, plan: _Plan, points_m: Float[np.ndarray, "N 3"]) -> None:
-    for point_m in points_m[np.argsort(points_m[:, 2], kind="stable")]:
-        level = int(90 + 140 * np.clip(point_m[2] / 2.5, 0.0, 1.0))
-        canvas.dot(plan(point_m), (level, level, min(255, level + 20)), 2.0)
-
-
-def _draw_routes(canvas: Canvas, plan: _Plan, sequence: Sequence, moving: np.ndarray) -> list[tuple[np.ndarray, str]]:
-    """The mean position of each moving object's tracks, or each moving track where objects are not recorded."""
     record = sequence.record or {}
-    objects = np.asarray(record.get("tracks", {}).get("object_index", np.arange(sequence.tracks_m.shape[1])))
-    names = {thing["object_index"]: str(thing.get("name")) for thing in record.get("objects", [])}
-    labels = []
-    for number, object_index in enumerate(np.unique(objects[moving]).tolist()):
-        members = moving[objects[moving] == object_index]
-        route_px = plan(sequence.tracks_m[:, members].mean(axis=1))
-        colour = track_colour(number, True)
-        canvas.line(route_px, colour, 2.0 if len(members) > 1 else 0.7, 0.9)
-        canvas.dot(route_px[0], colour, 6.0 if len(members) > 1 else 1.5)
-        if len(members) > 1:
-            labels.append((route_px[0], names.get(object_index, f"object {object_index}")))
-    return labels
+    curves = read_json(sequence_folder / AUDIT).get("motion", {}).get("curves", {})
+    figure = Figure(figsize=(15.0 if curves else 8.5, 9.0), dpi=100, layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(len(CURVES), 2 if curves else 1, width_ratios=(1.4, 1.0) if curves else (1.0,))
+    plan = figure.add_subplot(grid[:, 0])
+    _draw_room(plan, record)
+    _draw_people(plan, sequence, record)
+    for number, view in enumerate(sequence.views):
+        _draw_camera(plan, view, number)
+    _dress(plan, sequence_folder.absolute().name, record)
+    if curves:
+        _draw_curves([figure.add_subplot(grid[row, 1]) for row in range(len(CURVES))], curves, record)
+    figure.savefig(picture)
 
 
-def _draw_camera(canvas: Canvas, plan: _Plan, view: SequenceView, centre_m: Float64[np.ndarray, "F 3"]) -> None:
-    canvas.line(plan(centre_m), CAMERA_COLOUR, 1.5)
+def _draw_room(plan: Axes, record: dict[str, Any]) -> None:
+    outline = record.get("floor_polygon_m")
+    if outline:
+        plan.add_patch(Polygon(outline, facecolor="#f4f1ea", edgecolor="black", linewidth=2.0, zorder=0))
+    floor_m2 = float(np.prod(np.ptp(outline, axis=0))) if outline else np.inf
+    things = [thing for thing in record.get("objects", []) if len(thing.get("footprint_m", [])) >= 3]
+    for thing in sorted(things, key=lambda thing: thing["height_range_m"][1]):
+        spread_m2 = float(np.prod(np.ptp(thing["footprint_m"], axis=0)))
+        if thing["height_range_m"][0] > HEAD_ROOM_M or spread_m2 > STRUCTURE_SHARE * floor_m2:
+            continue
+        shade = "#dfe8d8" if thing["walkable"] else "#c9b79c"
+        plan.add_patch(Polygon(thing["footprint_m"], facecolor=shade, edgecolor="#7a6a50", linewidth=0.6, zorder=1))
+
+
+def _draw_people(plan: Axes, sequence: Sequence, record: dict[str, Any]) -> None:
+    people = _people(record)
+    if not people:
+        moving = moves_more_than(sequence.tracks_m, MOVING_M)
+        still_m, moved_m = sequence.tracks_m[0, ~moving], sequence.tracks_m[:, moving].reshape(-1, 3)
+        plan.scatter(still_m[:, 0], still_m[:, 1], s=2, color="grey")
+        plan.scatter(moved_m[:, 0], moved_m[:, 1], s=0.5, color="tab:red")
+    for number, person in enumerate(people):
+        route_m, colour = np.array(person["route_m"]), PEOPLE[number % len(PEOPLE)]
+        plan.plot(route_m[:, 0], route_m[:, 1], color=colour, linewidth=2.5, zorder=3, label=_caption(person))
+        plan.scatter(route_m[0, 0], route_m[0, 1], s=60, color=colour, zorder=4)
+        for pause in person.get("dwells", []):
+            mark = {"sit": "s", "look": "*", "stand": "D"}.get(pause["purpose"], "o")
+            x_m, y_m, _ = route_m[pause["first_frame"]]
+            plan.scatter(x_m, y_m, s=70, marker=mark, facecolor="white", edgecolor=colour, zorder=4)
+
+
+def _draw_camera(plan: Axes, view: SequenceView, number: int) -> None:
+    centre_m = np.stack([camera_centre_m(pose) for pose in view.camera_from_world])
+    colour = CAMERAS[number % len(CAMERAS)]
+    plan.plot(
+        centre_m[:, 0], centre_m[:, 1], color=colour, linewidth=1.5, linestyle="--", zorder=5, label=f"view {number}"
+    )
+    for share in np.linspace(0.0, 1.0, FRUSTA):
+        frame = round(share * (len(centre_m) - 1))
+        corners_m = _frustum_m(view, frame, centre_m[frame])
+        plan.fill(corners_m[:, 0], corners_m[:, 1], facecolor=colour, alpha=0.08, edgecolor="none", zorder=2)
+        plan.plot(corners_m[:, 0], corners_m[:, 1], color=colour, alpha=0.9 - 0.6 * share, linewidth=0.8, zorder=5)
+    x_m, y_m, _ = centre_m[0]
+    plan.text(x_m, y_m, f" {number}", color=colour, fontsize=12, fontweight="bold", zorder=6)
+
+
+def _frustum_m(view: SequenceView, frame: int, centre_m: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "4 2"]:
+    """The sides of the image from above: a triangle, closed."""
     fx, _, cx, _ = np.asarray(view.intrinsics_px, np.float64)
-    for frame in (0, len(centre_m) - 1):
-        world_from_camera = np.asarray(view.camera_from_world[frame, :3, :3], np.float64).T
-        # The principal point is taken for the middle, so the image's sides lie cx to its left and right.
-        sides = np.array([[-cx / fx, 0.0, 1.0], [cx / fx, 0.0, 1.0]]) * FRUSTUM_M
-        ends_m = centre_m[frame] + sides @ world_from_camera.T
-        corners = plan(np.stack([centre_m[frame], ends_m[0], ends_m[1], centre_m[frame]]))
-        canvas.line(corners, CAMERA_COLOUR, 1.0, 0.9 if frame == 0 else 0.4)
-    canvas.dot(plan(centre_m[0]), CAMERA_COLOUR, 4.0)
+    world_from_camera = np.asarray(view.camera_from_world[frame, :3, :3], np.float64).T
+    # The principal point is taken for the middle, so the image's sides lie cx to its left and right.
+    sides = np.array([[-cx / fx, 0.0, 1.0], [cx / fx, 0.0, 1.0]]) * FRUSTUM_M
+    ends_m = centre_m + sides @ world_from_camera.T
+    return np.stack([centre_m, ends_m[0], ends_m[1], centre_m])[:, :2]
 
 
-def _labelled(picture: Image.Image, labels: list[tuple[np.ndarray, str]], plan: _Plan) -> Image.Image:
-    draw = ImageDraw.Draw(picture)
-    for place, text in labels:
-        x, y = place.tolist()
-        draw.text((x + 8, y - 18), text, INK, text_font(15), stroke_width=SMOOTH - 1, stroke_fill=BACKGROUND)
-    bar_px = plan.scale_px
-    bottom = picture.height - 22
-    draw.line((BORDER_PX, bottom, BORDER_PX + bar_px, bottom), INK, 3)
-    draw.text((BORDER_PX + bar_px + 8, bottom - 10), "1 m", INK, text_font(15))
-    return picture
+def _dress(plan: Axes, name: str, record: dict[str, Any]) -> None:
+    kind = record.get("room_kind")
+    plan.set_title(f"{name}, {kind}" if kind else name)
+    plan.set_aspect("equal")
+    plan.set_xlabel("x, m")
+    plan.set_ylabel("y, m")
+    plan.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=2, fontsize=8, frameon=False)
+
+
+def _draw_curves(rows: list[Axes], curves: dict[str, Any], record: dict[str, Any]) -> None:
+    fps = float(record.get("fps", 1.0))
+    for axes, (title, name, of_people) in zip(rows, CURVES, strict=True):
+        colours = PEOPLE if of_people else CAMERAS
+        for number, values in enumerate(curves[name]):
+            axes.plot(np.arange(len(values)) / fps, values, color=colours[number % len(colours)], linewidth=1.2)
+        axes.set_title(title, fontsize=9, loc="left", pad=2)
+        axes.tick_params(labelsize=8)
+        axes.set_ylim(bottom=0.0)
+        axes.margins(x=0.0)
+        if axes is not rows[-1]:
+            axes.set_xticklabels([])
+    rows[-1].set_xlabel("seconds", fontsize=8)
+
+
+def _people(record: dict[str, Any]) -> list[dict[str, Any]]:
+    return [thing for thing in record.get("objects", []) if thing.get("route_m")]
+
+
+def _caption(person: dict[str, Any]) -> str:
+    return f"{person['name']}: {person.get('action', '')}".rstrip(": ")

@@ -14,6 +14,7 @@
 Ours, beside it::
 
     sequence.json              where it comes from; object, face, barycentric point and class of each track; sha256
+    audit.json                 what the checks of the sequence and of its motion found
     surface_xyz.npy            (F,P,3,3) float32  world positions of the corners of each track's triangle
 """
 
@@ -26,4 +27,5 @@ VISIBILITY = "visibility.npy"
 DEPTH = "depth.npy"
 FOREGROUND = "foreground_mask.npy"
 RECORD = "sequence.json"
+AUDIT = "audit.json"
 SURFACE = "surface_xyz.npy"

@@ -1,12 +1,17 @@
 """What sequence.json says of where a sequence comes from."""
 
+from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
 import perpetua
-from perpetua.actors.types import ActorMesh
+from perpetua.actors.types import ActorMesh, Route
 from perpetua.config import Config
+from perpetua.geometry.mesh import TriMesh
 from perpetua.pipeline.store import library_versions
-from perpetua.rooms.types import Room
+from perpetua.rooms.types import Room, SceneObject
 from perpetua.seeding import StageSeed
 
 LICENCES = {
@@ -16,11 +21,11 @@ LICENCES = {
 }
 
 
-def sequence_record(config: Config, seed: StageSeed, room: Room, actors: tuple[ActorMesh, ...]) -> dict[str, Any]:
-    """Seed, config, object table, versions and licences, as JSON values."""
-    table: list[dict[str, Any]] = [
-        {"object_index": thing.object_index, "name": thing.name, "category": thing.category} for thing in room.objects
-    ]
+def sequence_record(
+    config: Config, seed: StageSeed, room: Room, routes: tuple[Route, ...], actors: tuple[ActorMesh, ...]
+) -> dict[str, Any]:
+    """Seed, config, object table with footprints, routes, versions and licences, as JSON values."""
+    table = [_object_entry(thing) for thing in room.objects]
     table += [
         {
             "object_index": actor.object_index,
@@ -28,8 +33,12 @@ def sequence_record(config: Config, seed: StageSeed, room: Room, actors: tuple[A
             "category": "person",
             "actor": actor.actor,
             "description": actor.description,
+            "action": route.description,
+            "dwells": [asdict(dwell) for dwell in route.dwells],
+            "route_m": np.round(route.position_m, 4).tolist(),
+            "heading_rad": np.round(route.heading_rad, 4).tolist(),
         }
-        for actor in actors
+        for route, actor in zip(routes, actors, strict=True)
     ]
     return {
         "perpetua": perpetua.__version__,
@@ -37,9 +46,35 @@ def sequence_record(config: Config, seed: StageSeed, room: Room, actors: tuple[A
         "room": seed.room,
         "room_name": room.name,
         "room_kind": room.kind,
+        "room_height_m": room.height_m,
+        "floor_polygon_m": room.floor_polygon_m.tolist(),
         "fps": config.sequence.fps,
         "config": config.model_dump(mode="json"),
         "objects": table,
         "versions": library_versions(),
         "licences": LICENCES,
     }
+
+
+def _object_entry(thing: SceneObject) -> dict[str, Any]:
+    heights_m = thing.mesh.vertices_m[:, 2]
+    low_m, high_m = (float(heights_m.min()), float(heights_m.max())) if len(heights_m) else (0.0, 0.0)
+    return {
+        "object_index": thing.object_index,
+        "name": thing.name,
+        "category": thing.category,
+        "walkable": thing.walkable,
+        "height_range_m": [round(low_m, 4), round(high_m, 4)],
+        "footprint_m": _footprint_m(thing.mesh),
+    }
+
+
+def _footprint_m(mesh: TriMesh) -> list[list[float]]:
+    """The convex outline of a mesh from above, to the millimetre; empty where it has no area."""
+    places_m = mesh.vertices_m[:, :2]
+    try:
+        corners_m = places_m[ConvexHull(places_m).vertices]
+    except (QhullError, ValueError):
+        return []
+    outline: list[list[float]] = np.round(corners_m, 3).tolist()
+    return outline

@@ -10,11 +10,12 @@ from typing import Any
 from perpetua.config import Config
 from perpetua.errors import ActorError, CameraError, PerpetuaError, RouteError, TrackError
 from perpetua.files import read_json, write_json
+from perpetua.formats.layout import AUDIT as AUDIT_FILE
 from perpetua.pipeline import codec, store
 from perpetua.pipeline.events import Event, OnEvent
 from perpetua.pipeline.layout import OutputLayout
 from perpetua.pipeline.memory import PeakMemory
-from perpetua.pipeline.stages import AUDIT_FILE, SEQUENCE_FOLDER, STAGES, Stage, StageContext
+from perpetua.pipeline.stages import SEQUENCE_FOLDER, STAGES, Stage, StageContext
 from perpetua.rendering.scripts import scripts_sha256
 from perpetua.seeding import StageSeed
 

@@ -14,13 +14,14 @@ from perpetua.actors.motion.plan import make_motions
 from perpetua.actors.routes import plan_routes
 from perpetua.actors.types import ActorMesh, BodyMotion, Route
 from perpetua.actors.validation import validate_actors
+from perpetua.audit.motion_audit import MotionLimits, audit_motion
 from perpetua.audit.verify import verify_sequence
 from perpetua.cameras.plan import plan_cameras
 from perpetua.cameras.types import CameraPath
 from perpetua.config import Config
-from perpetua.errors import AuditError
+from perpetua.errors import AuditError, CameraError
 from perpetua.files import read_json, write_json
-from perpetua.formats import EXPORTERS
+from perpetua.formats import EXPORTERS, layout
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
 from perpetua.pipeline.config import RedrawConfig
@@ -42,10 +43,10 @@ _FPS = "sequence.fps"
 
 # Where the export stage writes the sequence inside its folder, until it is published.
 SEQUENCE_FOLDER = "sequence"
-AUDIT_FILE = "audit.json"
 # Figures of the stages' own checks, which the audit gathers.
 ACTOR_FIGURES = "validation.json"
 CAMERA_FIGURES = "plan.json"
+MOTION_FIGURES = "motion.json"
 # Where Blender's job and its finished frames lie, inside the folder of the render stage.
 RENDER_JOB_FOLDER = "job"
 
@@ -198,7 +199,25 @@ def _cameras(context: StageContext) -> tuple[CameraPath, ...]:
         context.seed,
     )
     write_json(context.folder / CAMERA_FIGURES, plan.to_json())
+    _require_kept_limits(context, plan.paths)
     return plan.paths
+
+
+def _require_kept_limits(context: StageContext, cameras: tuple[CameraPath, ...]) -> None:
+    """Before anything is rendered, code that plans nothing measures what was planned."""
+    config = context.config
+    audit = audit_motion(
+        context.one("room", Room),
+        context.many("routes", Route),
+        context.many("actors", ActorMesh),
+        cameras,
+        config.sequence.fps,
+        MotionLimits(config.actors.routes, config.cameras, config.navigation),
+    )
+    write_json(context.folder / MOTION_FIGURES, audit.to_json())
+    if not audit.passed:
+        failures = "; ".join(str(check) for check in audit.checks if not check.passed)
+        raise CameraError(f"the plan does not keep its limits when measured exactly: {failures}")
 
 
 def _render_settings(config: Config) -> dict[str, Any]:
@@ -239,7 +258,7 @@ def _export(context: StageContext) -> None:
         context.many("cameras", CameraPath),
         context.many("render", RenderedView),
         context.one("tracks", SequenceTracks),
-        sequence_record(context.config, context.seed, room, actors),
+        sequence_record(context.config, context.seed, room, context.many("routes", Route), actors),
     )
 
 
@@ -249,8 +268,9 @@ def _audit(context: StageContext) -> None:
         "sequence": report.to_json(),
         "actors": read_json(context.stage_folders["actors"] / ACTOR_FIGURES),
         "cameras": read_json(context.stage_folders["cameras"] / CAMERA_FIGURES),
+        "motion": read_json(context.stage_folders["cameras"] / MOTION_FIGURES),
     }
-    write_json(context.folder / AUDIT_FILE, figures)
+    write_json(context.folder / layout.AUDIT, figures)
     if not report.passed:
         failures = "; ".join(str(check) for check in report.checks if not check.passed)
         raise AuditError(f"the finished sequence does not pass its audit: {failures}")
@@ -282,9 +302,9 @@ STAGES = (
     Stage(
         60,
         "cameras",
-        1,
-        ("room", "actors"),
-        _settings("cameras", _FRAMES, _FPS, "render.width_px", "render.height_px"),
+        2,
+        ("room", "routes", "actors"),
+        _settings("cameras", "actors.routes", "navigation", _FRAMES, _FPS, "render.width_px", "render.height_px"),
         _cameras,
     ),
     Stage(
@@ -300,8 +320,13 @@ STAGES = (
     ),
     Stage(80, "tracks", 1, ("room", "actors", "cameras", "render"), _settings("tracks"), _tracks),
     Stage(
-        90, "export", 1, ("room", "actors", "cameras", "render", "tracks"), lambda c: c.model_dump(mode="json"), _export
+        90,
+        "export",
+        2,
+        ("room", "routes", "actors", "cameras", "render", "tracks"),
+        lambda config: config.model_dump(mode="json"),
+        _export,
     ),
-    Stage(95, "audit", 1, ("actors", "cameras", "export"), _settings("audit"), _audit),
+    Stage(95, "audit", 2, ("actors", "cameras", "export"), _settings("audit"), _audit),
 )
 STAGE_NAMES = tuple(stage.name for stage in STAGES)

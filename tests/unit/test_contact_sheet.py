@@ -1,15 +1,18 @@
 """The pictures show what the sequence holds, where it is."""
 
+import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from PIL import Image
 from synthetic_sequence import write_scene
 
 from perpetua.audit.contact_sheet import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX, write_contact_sheet
-from perpetua.audit.drawing import BACKGROUND, Canvas, depth_colours
-from perpetua.audit.plan_view import write_plan_view
+from perpetua.audit.drawing import Canvas, depth_colours
+from perpetua.audit.plan_view import CURVES, write_plan_view
 from perpetua.errors import SequenceFormatError
 
 
@@ -68,13 +71,38 @@ def test_near_is_brighter_than_far_and_nothing_is_black() -> None:
     assert level[0] > level[1] > level[2] > level[3] == 0
 
 
-def test_plan_shows_cameras_and_routes(sequence: Path, tmp_path: Path) -> None:
+def test_plan_shows_cameras_and_tracks_where_nothing_else_is_recorded(sequence: Path, tmp_path: Path) -> None:
     write_plan_view(sequence, tmp_path / "plan.png")
-    plan = np.asarray(Image.open(tmp_path / "plan.png").convert("RGB")).astype(int)
-    saturated = (plan.max(axis=2) - plan.min(axis=2)) > 120
-    white = (plan > 230).all(axis=2)
-    assert saturated.sum() > 300 and white.sum() > 300
-    assert tuple(plan[0, 0]) == BACKGROUND
+    assert _pixels_near(tmp_path / "plan.png", "black") > 300
+    assert _pixels_near(tmp_path / "plan.png", "tab:red") > 100
+    assert _pixels_near(tmp_path / "plan.png", "#c9b79c") == 0
+
+
+def test_plan_shows_furniture_routes_and_curves_that_are_recorded(sequence: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "sequence"
+    shutil.copytree(sequence, copy)
+    record = json.loads((copy / "sequence.json").read_text())
+    square_m = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+    record["floor_polygon_m"] = [[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [-3.0, 3.0]]
+    record["objects"] = [
+        {"name": "table", "category": "table", "walkable": False, "height_range_m": [0, 1], "footprint_m": square_m},
+        {"name": "actor_0", "category": "person", "route_m": [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0]]},
+    ]
+    (copy / "sequence.json").write_text(json.dumps(record))
+    curve = [[0.0, 1.0, 2.0]]
+    (copy / "audit.json").write_text(json.dumps({"motion": {"curves": {name: curve for _, name, _ in CURVES}}}))
+    write_plan_view(copy, tmp_path / "plan.png")
+    assert _pixels_near(tmp_path / "plan.png", "#c9b79c") > 3000
+    assert _pixels_near(tmp_path / "plan.png", "tab:red") > 1000
+    with Image.open(tmp_path / "plan.png") as picture:
+        assert picture.width == 1500
+
+
+def _pixels_near(picture: Path, colour: str) -> int:
+    """How many pixels have a named colour."""
+    wanted = 255.0 * np.array(to_rgb(colour))
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(float)
+    return int((np.abs(pixels - wanted).max(axis=2) < 6.0).sum())
 
 
 def test_a_folder_without_sequence_is_an_error(tmp_path: Path) -> None:
