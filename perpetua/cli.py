@@ -133,27 +133,39 @@ def verify(folders: tuple[Path, ...], as_json: bool) -> None:
 
 
 @main.command()
-@click.argument("sequence", type=click.Path(path_type=Path))
+@click.argument("sequence", required=False, type=click.Path(path_type=Path))
 @click.option("--out", "png", type=click.Path(path_type=Path, dir_okay=False), help="Picture to write, .png or .jpg.")
 @click.option(
     "--plan", "plan_png", type=click.Path(path_type=Path, dir_okay=False), help="Also a plan, to this .png or .jpg."
 )
 @click.option("--times", type=click.IntRange(1, 24), default=6, show_default=True, help="Frames shown.")
-def preview(sequence: Path, png: Path | None, plan_png: Path | None, times: int) -> None:
+@click.option("--actors", type=click.IntRange(min=1), metavar="N",
+              help="Instead of a sequence, draw the first N actors of a seed, standing and walking.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="With --actors: their seed.")
+def preview(
+    sequence: Path | None, png: Path | None, plan_png: Path | None, times: int, actors: int | None, seed: int
+) -> None:
     """Draw a contact sheet of a sequence: views by times, tracks with fading tails, depth, actors.
 
     The plan shows the ways of people and cameras from above.
     """
+    from perpetua.audit.actor_sheets import write_actor_sheet
     from perpetua.audit.contact_sheet import write_contact_sheet
     from perpetua.audit.plan_view import write_plan_view
 
-    target = png if png is not None else Path(f"{sequence.absolute().name}.png")
+    if actors is None and sequence is None:
+        raise InputError("preview needs the folder of a sequence, or --actors N")
+    name = "actors" if sequence is None else sequence.absolute().name
+    target = png if png is not None else Path(f"{name}.png")
     for picture in (target, plan_png):
         if picture is not None and picture.suffix.lower() not in PICTURE_SUFFIXES:
             raise InputError(f"a picture must end in {' or '.join(PICTURE_SUFFIXES)}, not '{picture.name}'")
-    write_contact_sheet(sequence, target, times)
+    if actors is not None:
+        write_actor_sheet(actors, seed, load_config(), "auto", target)
+    elif sequence is not None:
+        write_contact_sheet(sequence, target, times)
     click.echo(f"wrote {target}")
-    if plan_png is not None:
+    if plan_png is not None and sequence is not None:
         write_plan_view(sequence, plan_png)
         click.echo(f"wrote {plan_png}")
 

@@ -61,6 +61,8 @@ def test_standard_is_the_default_preset(tmp_path: Path) -> None:
         (("clean", "--out", "no-such-folder"), "holds no run of perpetua"),
         (("verify", "no-such-folder"), "no-such-folder"),
         (("preview", "no-such-folder"), "no-such-folder"),
+        (("preview",), "preview needs the folder of a sequence, or --actors N"),
+        (("preview", "--actors", "0"), "0 is not in the range x>=1"),
         (("preview", ".", "--out", "sheet.gif"), "a picture must end in .png or .jpg, not 'sheet.gif'"),
     ],
 )
