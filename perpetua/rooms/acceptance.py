@@ -6,6 +6,7 @@ from perpetua.errors import NavigationError
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.rooms.config import RoomsConfig
+from perpetua.rooms.support import find_faults
 from perpetua.rooms.types import Room
 
 # For each kind, the furniture it is recognised by: of every group at least one category must be in the room.
@@ -13,7 +14,7 @@ REQUIRED_FURNITURE: dict[str, tuple[frozenset[str], ...]] = {
     "bathroom": (frozenset({"toilet", "bathtub", "shower"}), frozenset({"sink", "bathroom_cabinet"})),
     "bedroom": (frozenset({"bed"}),),
     "diningroom": (frozenset({"dining_table", "table"}), frozenset({"chair"})),
-    "kitchen": (frozenset({"kitchen_counter", "kitchen_cabinet", "kitchen_island", "oven", "sink"}),),
+    "kitchen": (frozenset({"kitchen_counter", "kitchen_cabinet", "kitchen_island"}),),
     "livingroom": (frozenset({"sofa", "armchair"}),),
 }
 
@@ -33,13 +34,15 @@ def check_room(room: Room, config: RoomsConfig, navigation: NavigationConfig) ->
 
     Raises:
         RoomRejected: object indices clash or do not fit 16 bits, a vertex is not finite, the room has too many
-            triangles, its kind's furniture is missing, or too little connected floor is free.
+            triangles, its kind's furniture is missing, too little connected floor is free, or something
+            floats or is sunk.
     """
     _check_object_indices(room)
     _check_vertices(room)
     _check_triangles(room, config.max_triangles)
     _check_furniture(room)
     _check_free_floor(room, config.min_free_floor_m2, navigation)
+    _check_support(room)
 
 
 def _check_object_indices(room: Room) -> None:
@@ -83,3 +86,10 @@ def _check_free_floor(room: Room, min_free_floor_m2: float, navigation: Navigati
             f"{free_floor_m2:.1f} square metres of connected floor are free; "
             f"rooms.min_free_floor_m2 is {min_free_floor_m2:.1f}",
         )
+
+
+def _check_support(room: Room) -> None:
+    faults = find_faults(room.objects)
+    if faults:
+        more = f", and {len(faults) - 1} more like it" if len(faults) > 1 else ""
+        raise RoomRejected("support", f"{faults[0]}{more}")

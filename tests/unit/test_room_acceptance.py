@@ -6,10 +6,11 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from perpetua.geometry.mesh import TriMesh
+from perpetua.geometry.mesh import TriMesh, join
 from perpetua.navigation.config import NavigationConfig
 from perpetua.rooms.acceptance import REQUIRED_FURNITURE, RoomRejected, check_room
 from perpetua.rooms.config import RoomKind, RoomsConfig
+from perpetua.rooms.support import find_faults
 from perpetua.rooms.types import Room, SceneObject
 
 NAVIGATION = NavigationConfig(cell_m=0.1)
@@ -112,3 +113,80 @@ def test_triangle_budget_holds_to_the_triangle() -> None:
     triangles = sum(len(thing.mesh.faces) for thing in room.objects)
     check_room(room, CONFIG.model_copy(update={"max_triangles": triangles}), NAVIGATION)
     assert _rule(room, CONFIG.model_copy(update={"max_triangles": triangles - 1})) == "triangles"
+
+
+def _box(low_m: tuple[float, float, float], high_m: tuple[float, float, float]) -> TriMesh:
+    low, high = np.array(low_m), np.array(high_m)
+    corners_m = low + (high - low) * np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [(a, b, c) for a, b, c, _ in quads] + [(a, c, d) for a, _, c, d in quads]
+    return TriMesh(corners_m, np.array(faces, np.int32))
+
+
+def _with(*things: SceneObject) -> Room:
+    """A room with a wall at x = 2 and these things."""
+    room = _room()
+    wall = _thing(5, "wall", _box((2.0, -2.0, 0.0), (2.1, 2.0, 2.5)))
+    return replace(room, objects=(*room.objects, wall, *things))
+
+
+def _table(index: int, lift_m: float = 0.0) -> SceneObject:
+    """A top of 0.8 m x 0.8 m on four legs, 0.7 m high."""
+    corners = [(x, y) for x in (0.0, 0.75) for y in (0.0, 0.75)]
+    legs = [_box((x, y, lift_m), (x + 0.05, y + 0.05, 0.66 + lift_m)) for x, y in corners]
+    top = _box((0.0, 0.0, 0.66 + lift_m), (0.8, 0.8, 0.7 + lift_m))
+    return _thing(index, "table", join([*legs, top]))
+
+
+def _faults(*things: SceneObject) -> list[tuple[str, bool, float]]:
+    found = find_faults(_with(*things).objects)
+    return [(fault.name, fault.floats, round(fault.distance_m, 3)) for fault in found]
+
+
+@pytest.mark.parametrize("gap_m", [-0.025, 0.0, 0.025])
+def test_what_stands_within_three_centimetres_is_no_fault(gap_m: float) -> None:
+    cup = _thing(11, "cup", _box((0.3, 0.3, 0.7 + gap_m), (0.38, 0.38, 0.8 + gap_m)))
+    assert _faults(_table(10), cup) == []
+    assert _faults(_table(10, lift_m=gap_m)) == []
+
+
+def test_what_floats_is_found_with_its_drop() -> None:
+    assert _faults(_table(10, lift_m=0.04)) == [("table_10", True, 0.04)]
+    cup = _thing(11, "cup", _box((0.3, 0.3, 0.74), (0.38, 0.38, 0.84)))
+    assert _faults(_table(10), cup) == [("cup_11", True, 0.04)]
+
+
+def test_what_stands_on_a_floating_table_floats_with_it() -> None:
+    cup = _thing(11, "cup", _box((0.3, 0.3, 1.0), (0.38, 0.38, 1.1)))
+    assert [name for name, _, _ in _faults(_table(10, lift_m=0.3), cup)] == ["table_10", "cup_11"]
+
+
+def test_what_is_sunk_is_found_with_its_depth() -> None:
+    cup = _thing(11, "cup", _box((0.3, 0.3, 0.66), (0.38, 0.38, 0.78)))
+    assert _faults(_table(10), cup) == [("cup_11", False, 0.04)]
+    assert _faults(_table(10, lift_m=-0.05)) == [("table_10", False, 0.05)]
+
+
+def test_a_chair_under_a_table_is_not_sunk() -> None:
+    chair = join([_box((0.2, 0.2, 0.0), (0.6, 0.6, 0.45)), _box((0.2, 0.2, 0.45), (0.25, 0.6, 0.6))])
+    assert _faults(_table(10), _thing(11, "chair", chair)) == []
+
+
+def test_a_chair_does_not_hang_on_a_wall_but_a_painting_does() -> None:
+    beside_wall = _box((1.6, 0.0, 0.3), (1.99, 0.4, 0.8))
+    assert _faults(_thing(10, "chair", beside_wall)) == [("chair_10", True, 0.3)]
+    assert _faults(_thing(10, "painting", beside_wall)) == []
+    away = _box((1.6, 0.0, 0.3), (1.96, 0.4, 0.8))
+    assert _faults(_thing(10, "painting", away)) == [("painting_10", True, 0.3)]
+
+
+def test_a_shade_belongs_to_its_lamp() -> None:
+    pole = _thing(10, "floor_lamp", _box((0.5, 0.5, 0.0), (0.52, 0.52, 1.5)))
+    ring = [_box((x, 0.3, 1.2), (x + 0.01, 0.7, 1.4)) for x in (0.3, 0.7)]
+    assert _faults(pole, _thing(11, "floor_lamp", join(ring))) == []
+    assert _faults(_thing(11, "floor_lamp", join(ring))) == [("floor_lamp_11", True, 1.2)]
+
+
+def test_a_room_with_something_in_the_air_is_rejected() -> None:
+    assert _rule(_with(_table(10, lift_m=0.1))) == "support"
+    check_room(_with(_table(10)), CONFIG, NAVIGATION)
