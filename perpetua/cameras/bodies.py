@@ -3,13 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float32, Float64
 
 from perpetua.actors.types import ActorMesh
 
 # Heights of the body points as shares of the actor's height, from the head down.
 BODY_LEVELS = (0.93, 0.75, 0.55, 0.28, 0.05)
 TORSO_LEVELS = (0.5, 0.85)
+# The middle of the torso is that of every n-th of its vertices.
+TORSO_STRIDE = 8
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class ActorBounds:
 
 def actor_bounds(actors: tuple[ActorMesh, ...]) -> ActorBounds:
     """The capsules and body points of actor meshes, frame by frame."""
-    each = [_one_actor(actor.vertices_m.astype(np.float64)) for actor in actors]
+    each = [_one_actor(actor.vertices_m) for actor in actors]
     return ActorBounds(*(np.stack([bounds[field] for bounds in each]) for field in range(5)))
 
 
@@ -71,15 +73,24 @@ def capsule_distance_m(points_m: Float64[np.ndarray, "N 1 3"], bounds: ActorBoun
     return np.asarray(np.hypot(horizontal_m, np.maximum(above_m, 0.0)) - bounds.radius_m[:, None])
 
 
-def _one_actor(vertices_m: Float64[np.ndarray, "T P 3"]) -> tuple[np.ndarray, ...]:
-    bottom_m, top_m = vertices_m[..., 2].min(axis=1), vertices_m[..., 2].max(axis=1)
+def _one_actor(vertices_m: Float32[np.ndarray, "T P 3"]) -> tuple[np.ndarray, ...]:
+    bottom_m = vertices_m[..., 2].min(axis=1).astype(np.float64)
+    top_m = vertices_m[..., 2].max(axis=1).astype(np.float64)
+    axis_m = _torso_axis_m(vertices_m[:, ::TORSO_STRIDE].astype(np.float64), bottom_m, top_m)
+    beside_m: Float32[np.ndarray, "T P 2"] = vertices_m[..., :2] - axis_m[:, None].astype(np.float32)
+    # Rounded up, so that single precision leaves no vertex outside.
+    radius_m = np.sqrt(np.einsum("tpi,tpi->tp", beside_m, beside_m).max(axis=1).astype(np.float64)) + 1e-6
+    heights_m = bottom_m[:, None] + (top_m - bottom_m)[:, None] * np.array(BODY_LEVELS)
+    plane_m = np.repeat(axis_m[:, None], len(BODY_LEVELS), axis=1)
+    return axis_m, bottom_m, top_m, radius_m, np.concatenate([plane_m, heights_m[..., None]], axis=-1)
+
+
+def _torso_axis_m(
+    vertices_m: Float64[np.ndarray, "T P 3"], bottom_m: Float64[np.ndarray, " T"], top_m: Float64[np.ndarray, " T"]
+) -> Float64[np.ndarray, "T 2"]:
     level = (vertices_m[..., 2] - bottom_m[:, None]) / np.maximum(top_m - bottom_m, 1e-6)[:, None]
     torso = (level > TORSO_LEVELS[0]) & (level < TORSO_LEVELS[1])
     # A mesh with no vertex at those heights is taken whole.
     torso |= ~torso.any(axis=1, keepdims=True)
     weight = torso / torso.sum(axis=1, keepdims=True)
-    axis_m = np.einsum("tp,tpi->ti", weight, vertices_m[..., :2])
-    radius_m = np.linalg.norm(vertices_m[..., :2] - axis_m[:, None], axis=-1).max(axis=1)
-    heights_m = bottom_m[:, None] + (top_m - bottom_m)[:, None] * np.array(BODY_LEVELS)
-    plane_m = np.repeat(axis_m[:, None], len(BODY_LEVELS), axis=1)
-    return axis_m, bottom_m, top_m, radius_m, np.concatenate([plane_m, heights_m[..., None]], axis=-1)
+    return np.einsum("tp,tpi->ti", weight, vertices_m[..., :2])

@@ -2,13 +2,13 @@
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from perpetua.config_base import Section
 
 Framing = Literal["close", "medium", "wide"]
 Height = Literal["floor", "table", "eye", "ceiling"]
-Style = Literal["dolly", "orbit", "handheld", "walk_along"]
+Style = Literal["dolly", "orbit", "handheld", "walk_along", "static"]
 
 
 class CameraWeights(Section):
@@ -18,9 +18,10 @@ class CameraWeights(Section):
     actor_clearance: float = Field(60.0, ge=0.0, description="weight of the distance to actors")
     framing: float = Field(40.0, ge=0.0, description="weight of the focus lying inside the image")
     size: float = Field(3.0, ge=0.0, description="weight of the focus having the wished height in the image")
-    coverage: float = Field(60.0, ge=0.0, description="weight of every actor being seen by two views")
+    coverage: float = Field(12.0, ge=0.0, description="weight of every actor being seen by two views")
     occlusion: float = Field(30.0, ge=0.0, description="weight of a clear line of sight past furniture")
     crowding: float = Field(4.0, ge=0.0, description="weight of a clear line of sight past other actors")
+    foreground: float = Field(10.0, ge=0.0, description="weight of no actor filling the image from close by")
     smoothness: float = Field(0.3, ge=0.0, description="weight of small acceleration of position")
     rotation: float = Field(1.0, ge=0.0, description="weight of slow and steady turning")
     limits: float = Field(30.0, ge=0.0, description="weight of the limits of speed, acceleration and turning")
@@ -36,16 +37,18 @@ class CamerasConfig(Section):
     """How many cameras, how they may move, and the hard limits they keep."""
 
     count: int = Field(4, ge=1, le=32, description="synchronized views")
-    min_fov_deg: float = Field(55.0, ge=20.0, le=120.0, description="narrowest horizontal field of view, degrees")
-    max_fov_deg: float = Field(80.0, ge=20.0, le=120.0, description="widest horizontal field of view, degrees")
+    min_fov_deg: float = Field(35.0, ge=20.0, le=120.0, description="narrowest horizontal field of view, degrees")
+    max_fov_deg: float = Field(90.0, ge=20.0, le=120.0, description="widest horizontal field of view, degrees")
     framings: tuple[Framing, ...] = Field(
-        ("medium", "wide", "medium", "close"), min_length=1, description="framing wishes, dealt to the views at random"
+        ("wide", "medium", "wide", "close"), min_length=1, description="framing wishes, dealt to the views at random"
     )
     heights: tuple[Height, ...] = Field(
         ("eye", "table", "ceiling", "floor"), min_length=1, description="heights, dealt to the views at random"
     )
     styles: tuple[Style, ...] = Field(
-        ("dolly", "orbit", "handheld", "walk_along"), min_length=1, description="ways to move, dealt at random"
+        ("dolly", "orbit", "handheld", "walk_along"),
+        min_length=1,
+        description="ways to move, dealt at random; a static view stands on a tripod and only turns",
     )
     sway_m: float = Field(0.012, ge=0.0, le=0.1, description="amplitude of hand-held sway, metres")
     sway_deg: float = Field(0.6, ge=0.0, le=5.0, description="amplitude of hand-held turning and roll, degrees")
@@ -57,9 +60,29 @@ class CamerasConfig(Section):
     max_turn_deg_per_s: float = Field(120.0, gt=0.0, le=720.0, description="hard limit of turning, degrees/s")
     max_pitch_deg: float = Field(65.0, ge=20.0, le=80.0, description="steepest view up or down, degrees")
     min_focus_share: float = Field(
-        0.5, ge=0.0, le=1.0, description="least share of frames in which a view sees one of its focus actors"
+        0.75, ge=0.0, le=1.0, description="least share of frames in which a view sees one of its focus actors"
+    )
+    covering_views: int = Field(
+        2, ge=0, le=32, description="views that are to see each actor at each time; of fewer than 4 views half do"
+    )
+    min_covered_share: float = Field(
+        0.45, ge=0.0, le=1.0, description="least share of frames in which covering_views views see an actor"
+    )
+    min_apart_deg: float = Field(
+        45.0, ge=0.0, le=180.0, description="least mean angle between the two most different views of an actor, degrees"
     )
     candidates: int = Field(4, ge=1, le=64, description="sets of camera paths optimised; the best one wins")
     steps: int = Field(300, ge=10, le=10000, description="Adam steps")
     max_redraws: int = Field(5, ge=0, le=100, description="new sets of candidates tried when none passes")
     weights: CameraWeights = Field(default_factory=CameraWeights)
+
+    @model_validator(mode="after")
+    def _check_order(self) -> "CamerasConfig":
+        if self.min_fov_deg > self.max_fov_deg:
+            raise ValueError(f"min_fov_deg must not exceed max_fov_deg: {self.min_fov_deg} > {self.max_fov_deg}")
+        return self
+
+    @property
+    def views_per_actor(self) -> int:
+        """How many of the views are to see each actor at each time."""
+        return min(self.covering_views, self.count // 2)

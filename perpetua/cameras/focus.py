@@ -11,7 +11,7 @@ from perpetua.cameras.config import Framing
 HANDOVER_S = 1.0
 SEGMENT_S = (3.0, 6.0)
 PAIR_REACH_M = 2.2
-GROUP_REACH_M = 4.5
+GROUP_REACH_M = 6.0
 # How often a view of each framing wishes for one actor, a pair, the group.
 GROUPINGS: dict[Framing, tuple[float, float, float]] = {
     "close": (1.0, 0.0, 0.0),

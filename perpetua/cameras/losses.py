@@ -10,6 +10,9 @@ from torch import Tensor
 
 REVISIT_REACH_M = 0.35
 REVISIT_AFTER_S = 2.5
+# Half lost: 13 degrees outside of the image; a line of sight that touches the scene at one sample.
+HALF_OUTSIDE = 0.05
+HALF_BLOCKED = 0.15
 
 
 def field_distance(
@@ -77,17 +80,47 @@ def size(
 
 
 def coverage(
-    point_camera_m: Float[Tensor, "S C T A L 3"], tan_half_fov: Float[Tensor, "S C 2"], views: int, margin: float
+    point_camera_m: Float[Tensor, "S C T A L 3"],
+    tan_half_fov: Float[Tensor, "S C 2"],
+    blocked: Float[Tensor, "S C T A"],
+    views: int,
+    margin: float,
 ) -> Float[Tensor, " S"]:
-    """How far each actor's points lie outside the images of the ``views`` views that come nearest to showing them."""
+    """How lost each actor is, from 0 to 1, to the ``views`` views that come nearest to seeing it.
+
+    Lost is what lies outside of the image or behind the scene. The measure saturates, so that an actor who is a
+    little outside counts more than one whom the view cannot show anyway.
+    """
+    if views == 0:
+        return point_camera_m.new_zeros(point_camera_m.shape[0])
     outside = _outside(point_camera_m, tan_half_fov[:, :, None, None, None], margin).mean(-1)
-    return outside.topk(views, dim=1, largest=False).values.mean((1, 2, 3))
+    shown = HALF_OUTSIDE / (HALF_OUTSIDE + outside) * HALF_BLOCKED / (HALF_BLOCKED + blocked)
+    return (1.0 - shown).topk(views, dim=1, largest=False).values.mean((1, 2, 3))
 
 
-def occlusion(line_distance_m: Float[Tensor, "S C T P R"], wanted_m: float) -> Float[Tensor, " S"]:
-    """Lines of sight that pass nearer to the scene than wanted."""
+def blocked(line_distance_m: Float[Tensor, "S C T A R"], wanted_m: float) -> Float[Tensor, "S C T A"]:
+    """How much of each line of sight passes nearer to the scene than wanted, from 0 to 1."""
     short = torch.relu(wanted_m - line_distance_m) / wanted_m
-    return _per_candidate(short.square().sum(-1).clamp_max(4.0).mean(-1))
+    return 0.25 * short.square().sum(-1).clamp_max(4.0)
+
+
+def occlusion(blocked: Float[Tensor, "S C T A"], weight: Float[Tensor, "S C T A"]) -> Float[Tensor, " S"]:
+    """How much of the lines of sight to the focus is blocked."""
+    return _per_candidate((blocked * weight).sum(-1))
+
+
+def foreground(
+    point_camera_m: Float[Tensor, "S C T A L 3"],
+    height_m: Float[Tensor, "A T"],
+    tan_half_fov: Float[Tensor, "S C 2"],
+    most: float,
+) -> Float[Tensor, " S"]:
+    """Actors of whom any point is in the image and whose projected height exceeds ``most`` images."""
+    outside = _outside(point_camera_m, tan_half_fov[:, :, None, None, None], 0.0).amin(-1)
+    distance_m = point_camera_m.square().sum(-1).amin(-1).clamp_min(0.01).sqrt()
+    projected = height_m.T / (2.0 * distance_m * tan_half_fov[:, :, None, 1:])
+    large = torch.relu(torch.log(projected / most)).square()
+    return _per_candidate((large * HALF_OUTSIDE / (HALF_OUTSIDE + outside)).sum(-1))
 
 
 def crowding(
@@ -119,14 +152,15 @@ def unsteadiness(values: Float[Tensor, "S C T 3"], unit: float) -> Float[Tensor,
 def travel(
     position_m: Float[Tensor, "S C T 3"], step_s: float, wished_mps: Float[Tensor, "S C"]
 ) -> Float[Tensor, " S"]:
-    """Cameras that move more slowly, spread less, or move much faster than wished."""
+    """Cameras that move more slowly, spread less, or move much faster than wished; a wish of 0 is always met."""
+    moving, wished_mps = wished_mps > 0.0, wished_mps.clamp_min(0.01)
     speed = position_m.diff(dim=2).square().sum(-1).add(1e-10).sqrt().mean(-1) / step_s
     spread = (position_m - position_m.mean(2, keepdim=True)).square().sum(-1).mean(-1).add(1e-10).sqrt()
     # Points spread evenly over a line of length L have a standard deviation of 0.29 L.
     wished_spread = 0.25 * (wished_mps * step_s * (position_m.shape[2] - 1)).clamp_max(2.0)
     slow = torch.relu(1.0 - speed / wished_mps).square()
     fast = torch.relu(speed / wished_mps - 1.5).square()
-    return (slow + fast + torch.relu(1.0 - spread / wished_spread).square()).mean(1)
+    return (moving * (slow + fast + torch.relu(1.0 - spread / wished_spread).square())).mean(1)
 
 
 def revisiting(position_m: Float[Tensor, "S C T 3"], step_s: float) -> Float[Tensor, " S"]:

@@ -18,11 +18,11 @@ DEGREE = 3
 CONTROL_S = 0.6
 LEARNING_RATE_M = 0.02
 MARGIN = 0.15
-COVERING_VIEWS = 2
 COVERED_POINTS = 2
-LINE_SAMPLES = 20
-LINE_POINTS = 2
+LINE_SAMPLES = 16
 LINE_WANTED_M = 0.12
+# Projected height, in images, above which an actor crowds the view.
+MOST_FOREGROUND = 1.3
 CROWD_WANTED_M = 0.3
 CROWD_POINTS = 3
 # What the field and the sub-steps of the audit may add up to; actors that fill the image are kept further off.
@@ -62,7 +62,10 @@ class Solution:
 
 
 def optimise_paths(problem: Problem, config: CamerasConfig) -> Solution:
-    """Minimises all losses over all candidates; candidates do not influence each other."""
+    """Minimises all losses over all candidates; candidates do not influence each other.
+
+    The path of a view whose wished speed is 0 is a single point.
+    """
     times = problem.start_m.shape[2]
     basis = spline_basis(np.linspace(0.0, 1.0, times), problem.step_s * (times - 1))
     position = torch.tensor(_controls_along(problem.start_m, basis.shape[1]), dtype=torch.float32, requires_grad=True)
@@ -76,8 +79,9 @@ def optimise_paths(problem: Problem, config: CamerasConfig) -> Solution:
     )
     with torch.no_grad(), deterministic_torch():
         final = {name: value.double().numpy() for name, value in terms(position, offset).items()}
+        path = terms.tied(position)
     return Solution(
-        position.detach().double().numpy(),
+        path.double().numpy(),
         offset.detach().double().numpy(),
         np.sum(list(final.values()), axis=0),
         final,
@@ -127,15 +131,18 @@ class _Terms:
         watched = _watched_actor(problem.focus_weight)
         self.other = torch.from_numpy(_others(watched, bounds.axis_m.shape[0]))
         time = np.arange(problem.focus_m.shape[2])
-        self.watched_m = _tensor(bounds.point_m[watched, time][..., :LINE_POINTS, :])
-        self.line_share = torch.linspace(0.03, 0.93, LINE_SAMPLES)
+        self.watched_m = _tensor(bounds.chest_m[watched, time])
+        # Between head and chest.
+        self.sighted_m = self.point_m[:, :, :COVERED_POINTS].mean(2).transpose(0, 1)
+        self.line_share = torch.linspace(0.03, 0.93, LINE_SAMPLES)[:, None]
+        self.still = (self.speed_mps == 0.0)[..., None, None]
 
     def __call__(
         self, position_control: Float[Tensor, "S C K 3"], offset_control: Float[Tensor, "S C K 3"]
     ) -> dict[str, Float[Tensor, " S"]]:
         weights = self.config.weights
         offset_m = torch.einsum("tk,scki->scti", self.basis, offset_control)
-        position_m = torch.einsum("tk,scki->scti", self.basis, position_control) + self.sway_m
+        position_m = torch.einsum("tk,scki->scti", self.basis, self.tied(position_control)) + self.sway_m
         camera_from_world = _level_axes(self.focus_m + offset_m - position_m)
         terms = (
             self._clearances(position_m)
@@ -144,6 +151,10 @@ class _Terms:
             | {"offset": losses.unsteadiness(offset_m, 0.5)}
         )
         return {name: getattr(weights, name) * value for name, value in terms.items()}
+
+    def tied(self, position_control: Float[Tensor, "S C K 3"]) -> Float[Tensor, "S C K 3"]:
+        """The control points; those of a view that stands still are all their mean."""
+        return torch.where(self.still, position_control.mean(2, keepdim=True), position_control)
 
     def _clearances(self, position_m: Float[Tensor, "S C T 3"]) -> dict[str, Float[Tensor, " S"]]:
         to_scene = losses.field_distance(self.grid, self.origin_m, self.voxel_m, position_m)
@@ -159,26 +170,27 @@ class _Terms:
         sight_m = self.point_m.transpose(0, 1) - position_m[..., None, None, :]
         in_camera_m = torch.einsum("sctij,sctalj->sctali", camera_from_world, sight_m)
         distance_m = sight_m[..., 1, :].square().sum(-1).add(1e-8).sqrt()
-        line_m = position_m[..., None, None, :] + self.line_share[:, None] * (
-            self.watched_m - position_m[..., None, :]
-        ).unsqueeze(-2)
-        line_distance_m = losses.field_distance(self.grid, self.origin_m, self.voxel_m, line_m)
+        blocked = self._blocked(position_m)
+        height_m = self.top_m - self.bottom_m
         least, most = self.size_range.unbind(-1)
-        views = position_m.shape[1]
         return {
             "framing": losses.framing(in_camera_m, self.tan_half_fov, self.point_weight, MARGIN),
-            "size": losses.size(
-                distance_m, self.top_m - self.bottom_m, self.tan_half_fov, least, most, self.focus_weight
-            ),
+            "size": losses.size(distance_m, height_m, self.tan_half_fov, least, most, self.focus_weight),
             "coverage": losses.coverage(
-                in_camera_m[..., :COVERED_POINTS, :], self.tan_half_fov, min(COVERING_VIEWS, views), MARGIN
+                in_camera_m[..., :COVERED_POINTS, :], self.tan_half_fov, blocked, self.config.views_per_actor, MARGIN
             ),
-            "occlusion": losses.occlusion(line_distance_m, LINE_WANTED_M),
+            "occlusion": losses.occlusion(blocked, self.focus_weight),
             "crowding": losses.crowding(
-                position_m, self.watched_m[..., 1, :], self.point_m[:, :, :CROWD_POINTS], self.other, CROWD_WANTED_M
+                position_m, self.watched_m, self.point_m[:, :, :CROWD_POINTS], self.other, CROWD_WANTED_M
             ),
+            "foreground": losses.foreground(in_camera_m, height_m, self.tan_half_fov, MOST_FOREGROUND),
             "diversity": losses.diversity(position_m, self.axis_m, float(np.cos(LEAST_APART_RAD))),
         }
+
+    def _blocked(self, position_m: Float[Tensor, "S C T 3"]) -> Float[Tensor, "S C T A"]:
+        sight_m = self.sighted_m - position_m[..., None, :]
+        line_m = position_m[..., None, None, :] + self.line_share * sight_m[..., None, :]
+        return losses.blocked(losses.field_distance(self.grid, self.origin_m, self.voxel_m, line_m), LINE_WANTED_M)
 
     def _motion(
         self, position_m: Float[Tensor, "S C T 3"], forward: Float[Tensor, "S C T 3"]

@@ -11,9 +11,11 @@ from perpetua.actors.types import ActorMesh
 from perpetua.cameras.audit import CameraAudit, audit_paths
 from perpetua.cameras.bodies import ActorBounds, actor_bounds, bounds_at
 from perpetua.cameras.config import CamerasConfig
+from perpetua.cameras.focus import FocusSchedule
+from perpetua.cameras.moving_mesh import MovingMesh
 from perpetua.cameras.optimise import Problem, Solution, optimise_paths, spline_basis
 from perpetua.cameras.sdf import signed_distance_field
-from perpetua.cameras.starts import draw_start
+from perpetua.cameras.starts import StartScene, ViewStart, draw_starts
 from perpetua.cameras.types import CameraPath, SignedDistanceField
 from perpetua.cameras.wishes import ViewWish, draw_wishes, shown_points
 from perpetua.errors import CameraError
@@ -49,6 +51,8 @@ class CameraPlan:
             "actor_distance_m": self.audit.actor_distance_m.tolist(),
             "focus_share": self.audit.focus_share.tolist(),
             "travel_m": self.audit.travel_m.tolist(),
+            "covered_share": self.audit.covered_share.tolist(),
+            "apart_deg": self.audit.apart_deg.tolist(),
             "loss_terms": self.terms,
             "redraw": self.redraw,
             "candidate": self.candidate,
@@ -61,6 +65,7 @@ class _Scene:
 
     room: Room
     actors: tuple[ActorMesh, ...]
+    meshes: tuple[MovingMesh, ...]
     bounds: ActorBounds
     caster: Caster
     field: SignedDistanceField
@@ -101,22 +106,20 @@ def plan_cameras(
     _require_inputs(actors, frames)
     caster = Caster(join([thing.mesh for thing in room.objects]))
     field = signed_distance_field(room, caster, config.voxel_m)
-    scene = _Scene(room, actors, actor_bounds(actors), caster, field, fps, width_px, height_px)
+    meshes = tuple(MovingMesh(actor) for actor in actors)
+    scene = _Scene(room, actors, meshes, actor_bounds(actors), caster, field, fps, width_px, height_px)
     nearest: CameraAudit | None = None
     for redraw in range(config.max_redraws + 1):
-        wishes = [
-            draw_wishes(seed, redraw, candidate, scene.bounds, room.height_m, float(scene.times_s[-1]), config)
-            for candidate in range(config.candidates)
-        ]
-        problem = _pose_problem(scene, wishes, config, seed, redraw)
-        solution = optimise_paths(problem, config)
+        drafts = [_draw(scene, config, seed, redraw, candidate) for candidate in range(config.candidates)]
+        solution = optimise_paths(_pose_problem(scene, drafts, config), config)
         for candidate in np.argsort(solution.loss, kind="stable"):
-            paths = _paths(scene, wishes[candidate], solution, int(candidate))
-            focus = np.stack([wish.focus.members(scene.times_s, len(actors)) for wish in wishes[candidate]])
-            audit = audit_paths(paths, focus, room, actors, caster, fps, config)
+            draft = drafts[candidate]
+            paths = _paths(scene, draft, solution, int(candidate))
+            focus = np.stack([start.focus.members(scene.times_s, len(actors)) for start in draft.starts])
+            audit = audit_paths(paths, focus, room, actors, meshes, caster, fps, config)
             if audit.passed:
                 terms = {name: float(values[candidate]) for name, values in solution.terms.items()}
-                return CameraPlan(paths, focus, wishes[candidate], audit, terms, redraw, int(candidate))
+                return CameraPlan(paths, focus, draft.wishes, audit, terms, redraw, int(candidate))
             if nearest is None or len(audit.violations) < len(nearest.violations):
                 nearest = audit
     assert nearest is not None
@@ -139,33 +142,40 @@ def _require_inputs(actors: tuple[ActorMesh, ...], frames: int) -> None:
             )
 
 
-def _pose_problem(
-    scene: _Scene, wishes: list[tuple[ViewWish, ...]], config: CamerasConfig, seed: StageSeed, redraw: int
-) -> Problem:
+@dataclass(frozen=True)
+class _Draft:
+    """One candidate before it is optimised."""
+
+    wishes: tuple[ViewWish, ...]
+    starts: tuple[ViewStart, ...]
+
+
+def _draw(scene: _Scene, config: CamerasConfig, seed: StageSeed, redraw: int, candidate: int) -> _Draft:
+    wishes = draw_wishes(seed, redraw, candidate, scene.room.height_m, config)
+    aspect = scene.height_px / scene.width_px
+    start_scene = StartScene(scene.field, scene.caster, scene.bounds, float(scene.times_s[-1]), aspect, config)
+    return _Draft(wishes, draw_starts(seed, redraw, candidate, wishes, start_scene))
+
+
+def _pose_problem(scene: _Scene, drafts: list[_Draft], config: CamerasConfig) -> Problem:
     frames = len(scene.times_s)
     duration_s = float(scene.times_s[-1])
     times = max(LEAST_TIMES, int(np.ceil(duration_s * RATE_HZ)) + 1)
     sampled_s = np.linspace(0.0, duration_s, times)
-    starts, focus = [], []
-    for candidate, views in enumerate(wishes):
-        for wish in views:
-            rng = seed.stream("start", redraw, candidate, wish.camera)
-            knots_m = draw_start(rng, wish, scene.field, scene.caster, scene.bounds, duration_s, config)
-            starts.append(_interpolate(knots_m, times))
-            focus.append(_interpolate(_focus_m(scene, wish), times))
-    shape = (len(wishes), config.count)
+    shape = (len(drafts), config.count)
 
     def each(values: list[np.ndarray]) -> np.ndarray:
         return np.stack(values).reshape(*shape, *values[0].shape)
 
-    flat = [wish for views in wishes for wish in views]
+    flat = [wish for draft in drafts for wish in draft.wishes]
+    starts = [start for draft in drafts for start in draft.starts]
     aspect = scene.height_px / scene.width_px
     return Problem(
         step_s=duration_s / (times - 1),
-        start_m=each(starts),
-        focus_m=each(focus),
+        start_m=each([_interpolate(start.knots_m, times) for start in starts]),
+        focus_m=each([_interpolate(_focus_m(scene, start.focus), times) for start in starts]),
         sway_m=each([wish.sway.at(sampled_s)[:, :3] for wish in flat]),
-        focus_weight=each([wish.focus.weights(sampled_s, len(scene.actors)) for wish in flat]),
+        focus_weight=each([start.focus.weights(sampled_s, len(scene.actors)) for start in starts]),
         point_weight=each([shown_points(wish) for wish in flat]),
         tan_half_fov=each([np.tan(0.5 * wish.fov_rad) * np.array([1.0, aspect]) for wish in flat]),
         size_range=each([np.array([wish.framing.least_size, wish.framing.most_size]) for wish in flat]),
@@ -176,9 +186,9 @@ def _pose_problem(
     )
 
 
-def _focus_m(scene: _Scene, wish: ViewWish) -> Float64[np.ndarray, "T 3"]:
+def _focus_m(scene: _Scene, focus: FocusSchedule) -> Float64[np.ndarray, "T 3"]:
     """The point a view looks at: its focus's chests, smoothed so that steps do not shake the camera."""
-    weight = wish.focus.weights(scene.times_s, len(scene.actors))
+    weight = focus.weights(scene.times_s, len(scene.actors))
     point_m = np.einsum("ta,ati->ti", weight, scene.bounds.chest_m)
     return np.asarray(ndimage.gaussian_filter1d(point_m, FOCUS_SMOOTHING_S * scene.fps, axis=0, mode="nearest"))
 
@@ -189,14 +199,16 @@ def _interpolate(points_m: Float64[np.ndarray, "M 3"], count: int) -> Float64[np
     return np.stack([np.interp(wanted, given, points_m[:, i]) for i in range(3)], axis=1)
 
 
-def _paths(scene: _Scene, wishes: tuple[ViewWish, ...], solution: Solution, candidate: int) -> tuple[CameraPath, ...]:
+def _paths(scene: _Scene, draft: _Draft, solution: Solution, candidate: int) -> tuple[CameraPath, ...]:
     times_s = scene.times_s
     basis = spline_basis(np.linspace(0.0, 1.0, len(times_s)), float(times_s[-1]))
     paths = []
-    for view, wish in enumerate(wishes):
+    for view, (wish, start) in enumerate(zip(draft.wishes, draft.starts, strict=True)):
         sway = wish.sway.at(times_s)
         position_m = np.einsum("tk,ki->ti", basis, solution.position_control_m[candidate, view]) + sway[:, :3]
-        target_m = _focus_m(scene, wish) + np.einsum("tk,ki->ti", basis, solution.offset_control_m[candidate, view])
+        target_m = _focus_m(scene, start.focus) + np.einsum(
+            "tk,ki->ti", basis, solution.offset_control_m[candidate, view]
+        )
         intrinsics = Intrinsics.centred(scene.width_px, scene.height_px, wish.fov_rad)
         paths.append(CameraPath(wish.camera, _swayed(position_m, target_m, sway[:, 3:]), intrinsics))
     return tuple(paths)

@@ -1,52 +1,162 @@
-"""Where the optimisation starts: for each view a chain of free places that see its focus, by dynamic programming."""
+"""Where the optimisation starts: who watches whom when, and from where.
+
+Views are settled one after the other. For each of several focus schedules, dynamic programming finds the cheapest
+chain of free places; a chain is cheap where its view sees its focus, and sees actors whom too few of the other
+views see. Going over the views twice lets the first ones answer to the last.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Bool, Float64, Int64
 
 from perpetua.cameras.bodies import ActorBounds, bounds_at, capsule_distance_m
 from perpetua.cameras.config import CamerasConfig
+from perpetua.cameras.focus import FocusSchedule, draw_focus
 from perpetua.cameras.sdf import distance_at_m, voxel_centres_m
 from perpetua.cameras.types import SignedDistanceField
 from perpetua.cameras.wishes import ViewWish
 from perpetua.geometry.raycast import Caster
+from perpetua.geometry.transforms import look_at
+from perpetua.seeding import StageSeed
 
 PLACES = 140
 KNOT_S = 1.4
+# Moments at which sight is tested, for each interval between knots.
+MOMENTS = 4
+SCHEDULES = 6
+SWEEPS = 2
 ROOMY_M = 0.2
 EDGE_SAMPLES = 7
 BLOCKED_COST = 50.0
+HIDDEN_COST = 6.0
+COVERAGE_GAIN = 3.0
+AZIMUTH_COST = 1.5
+# Steps of a view that stands still cost this much for each metre.
+STILL_COST_PER_M = 1e3
+SIGHT_POINTS = 2
+IMAGE_SHARE = 0.9
+SEEN_SHARE = 0.5
 
 
-def draw_start(
-    rng: np.random.Generator,
-    wish: ViewWish,
-    field: SignedDistanceField,
-    caster: Caster,
-    bounds: ActorBounds,
-    duration_s: float,
-    config: CamerasConfig,
-) -> Float64[np.ndarray, "M 3"]:
-    """Way points of one view, evenly spaced in time over the sequence.
+@dataclass(frozen=True)
+class StartScene:
+    """What all views of all candidates start from; ``bounds`` holds the sequence's frames."""
 
-    The chain has the least sum of costs of its places (focus hidden or of the wrong size, too near an actor, wrong
-    direction or height) and of its steps (other length than the speed asks, through furniture, against the style).
-    ``bounds`` holds the sequence's frames.
-    """
-    knots = max(2, round(duration_s / KNOT_S) + 1)
-    frames = bounds.axis_m.shape[1]
-    then = bounds_at(bounds, np.linspace(0.0, frames - 1.0, knots))
-    weight = wish.focus.weights(np.linspace(0.0, duration_s, knots), bounds.axis_m.shape[0])
-    focus_m = np.einsum("ta,ati->ti", weight, then.chest_m)
-    places_m = _draw_places_m(rng, wish, field, then, config)
-    nearby = bounds_at(bounds, np.linspace(0.0, frames - 1.0, 4 * (knots - 1) + 1))
-    place_cost = (
-        6.0 * _hidden_share(places_m, caster, then, weight)
-        + _size_cost(places_m, wish, then, weight)
-        + _crowd_cost(places_m, nearby, knots, config.actor_clearance_m)
-        + (1.5 * _azimuth_cost(places_m, wish, then))[:, None]
-    )
-    step_cost = _step_cost(places_m, focus_m, wish, field, duration_s / (knots - 1), config)
-    return places_m[_cheapest_chain(place_cost, step_cost)]
+    field: SignedDistanceField
+    caster: Caster
+    bounds: ActorBounds
+    duration_s: float
+    aspect: float
+    config: CamerasConfig
+
+    @property
+    def knots(self) -> int:
+        """How many way points a start has."""
+        return max(2, round(self.duration_s / KNOT_S) + 1)
+
+    @cached_property
+    def moment_s(self) -> Float64[np.ndarray, " F"]:
+        """The moments at which sight is tested."""
+        return np.linspace(0.0, self.duration_s, MOMENTS * (self.knots - 1) + 1)
+
+    @cached_property
+    def moments(self) -> ActorBounds:
+        """The actors at those moments."""
+        return bounds_at(self.bounds, np.linspace(0.0, self.bounds.axis_m.shape[1] - 1.0, len(self.moment_s)))
+
+
+@dataclass(frozen=True)
+class ViewStart:
+    """Whom a view watches, and its way points, evenly spaced in time over the sequence."""
+
+    focus: FocusSchedule
+    knots_m: Float64[np.ndarray, "M 3"]
+
+
+@dataclass(frozen=True)
+class _Chain:
+    start: ViewStart
+    sees: Bool[np.ndarray, "F A"]
+    cost: float
+
+
+def draw_starts(
+    seed: StageSeed, redraw: int, candidate: int, wishes: tuple[ViewWish, ...], scene: StartScene
+) -> tuple[ViewStart, ...]:
+    """Starts of all views of one candidate."""
+    actors = scene.bounds.axis_m.shape[0]
+    leaders = seed.stream("leaders", redraw, candidate).permutation(actors)
+    views = []
+    for wish in wishes:
+        rng = seed.stream("start", redraw, candidate, wish.camera)
+        schedules = [
+            draw_focus(rng, scene.bounds, scene.duration_s, int(leaders[(wish.camera + k) % actors]), wish.grouping)
+            for k in range(SCHEDULES)
+        ]
+        views.append(_View(rng, wish, schedules, scene))
+    nobody = np.zeros((len(scene.moment_s), actors), bool)
+    chains: dict[int, _Chain] = {}
+    # Views with wide lenses have the most to show to choose from, and go first.
+    order = sorted(range(len(wishes)), key=lambda view: -wishes[view].fov_rad)
+    for view in order * SWEEPS:
+        seen_by = sum((chains[other].sees.astype(int) for other in chains if other != view), nobody.astype(int))
+        chains[view] = views[view].best_chain(seen_by)
+    return tuple(chains[view].start for view in range(len(wishes)))
+
+
+class _View:
+    """The places one view may take, and what each would see."""
+
+    def __init__(
+        self, rng: np.random.Generator, wish: ViewWish, schedules: list[FocusSchedule], scene: StartScene
+    ) -> None:
+        self.wish, self.schedules, self.scene = wish, schedules, scene
+        self.places_m = _draw_places_m(rng, wish, scene.field, scene.moments, scene.config)
+        self.clear = _clear(self.places_m, scene.caster, scene.moments)
+        crowd = _crowd_cost(self.places_m, scene.moments, scene.config.actor_clearance_m)
+        azimuth = _azimuth_cost(self.places_m, wish, scene.moments)
+        self.place_cost = _at_knots(crowd, np.max) + AZIMUTH_COST * azimuth[:, None]
+        self.size_cost = _size_cost(self.places_m, wish, scene.moments)
+        step_m = self.places_m[None] - self.places_m[:, None]
+        length_m = np.linalg.norm(step_m, axis=-1)
+        self.unit = step_m / np.maximum(length_m, 1e-6)[..., None]
+        blocked = _blocked(self.places_m, step_m, scene.field, scene.config)
+        self.step_cost = BLOCKED_COST * blocked + _length_cost(length_m, wish, scene.duration_s / (scene.knots - 1))
+
+    def best_chain(self, seen_by: Int64[np.ndarray, "F A"]) -> _Chain:
+        """The cheapest chain of any schedule, where ``seen_by`` counts the other views that see each actor."""
+        lacking = seen_by < self.scene.config.views_per_actor
+        # An actor whom the others seldom see is wanted the most.
+        need = lacking * (0.5 + lacking.mean(axis=0))
+        return min((self._chain(schedule, need) for schedule in self.schedules), key=lambda chain: chain.cost)
+
+    def _chain(self, schedule: FocusSchedule, need: Float64[np.ndarray, "F A"]) -> _Chain:
+        moments = self.scene.moments
+        weight = schedule.weights(self.scene.moment_s, moments.axis_m.shape[0])
+        focus_m = np.einsum("fa,afi->fi", weight, moments.chest_m)
+        seen = (_in_image(self.places_m, focus_m, self.wish, moments, self.scene.aspect) & self.clear).mean(axis=-1)
+        sight_cost = np.einsum(
+            "nfa,fa->nf", HIDDEN_COST * (1.0 - seen) + self.size_cost, weight
+        ) - COVERAGE_GAIN * np.einsum("nfa,fa->nf", seen, need)
+        place_cost = self.place_cost + _at_knots(sight_cost, np.mean)
+        at_knots_m = focus_m[::MOMENTS]
+        style_cost = [
+            _style_cost(self.places_m, self.unit, at_knots_m[k : k + 2], self.wish) for k in range(len(at_knots_m) - 1)
+        ]
+        chain, cost = _cheapest_chain(place_cost, self.step_cost + np.stack(style_cost))
+        knot = np.round(np.arange(len(focus_m)) / MOMENTS).astype(int)
+        sees = seen[np.array(chain)[knot], np.arange(len(focus_m))] >= SEEN_SHARE
+        return _Chain(ViewStart(schedule, self.places_m[chain]), sees, cost)
+
+
+def _at_knots(values: Float64[np.ndarray, "N F"], reduce: Callable[..., np.ndarray]) -> Float64[np.ndarray, "N M"]:
+    """Values at moments, reduced over those around each knot."""
+    knots = range(0, values.shape[1], MOMENTS)
+    half = MOMENTS // 2
+    return np.stack([reduce(values[:, max(0, k - half) : k + half + 1], axis=1) for k in knots], axis=1)
 
 
 def _draw_places_m(
@@ -74,51 +184,51 @@ def _azimuth_cost(
     return np.asarray(1.0 - offset @ wished / length_m)
 
 
-def _hidden_share(
-    places_m: Float64[np.ndarray, "N 3"], caster: Caster, bounds: ActorBounds, weight: Float64[np.ndarray, "M A"]
-) -> Float64[np.ndarray, "N M"]:
-    """Share of the focus's head and chest points that a place cannot see past the scene, at each knot."""
-    targets_m = bounds.point_m[:, :, :2]
-    shape = (len(places_m), *targets_m.shape[:-1])
-    origins_m = np.broadcast_to(places_m[:, None, None, None], (*shape, 3)).reshape(-1, 3)
-    clear = caster.clear(origins_m, np.broadcast_to(targets_m, (*shape, 3)).reshape(-1, 3)).reshape(shape)
-    return np.einsum("namk,ma->nm", ~clear, weight) / targets_m.shape[2]
+def _clear(places_m: Float64[np.ndarray, "N 3"], caster: Caster, bounds: ActorBounds) -> Bool[np.ndarray, "N F A L"]:
+    """Whether nothing of the scene lies between a place and an actor's head and chest."""
+    targets_m = np.swapaxes(bounds.point_m[:, :, :SIGHT_POINTS], 0, 1)
+    shape = (len(places_m), *targets_m.shape)
+    origins_m = np.broadcast_to(places_m[:, None, None, None], shape).reshape(-1, 3)
+    return caster.clear(origins_m, np.broadcast_to(targets_m, shape).reshape(-1, 3)).reshape(shape[:-1])
+
+
+def _in_image(
+    places_m: Float64[np.ndarray, "N 3"],
+    focus_m: Float64[np.ndarray, "F 3"],
+    wish: ViewWish,
+    bounds: ActorBounds,
+    aspect: float,
+) -> Bool[np.ndarray, "N F A L"]:
+    """Whether the same points lie in the image of a level camera that looks at the focus."""
+    world_from_camera = look_at(*np.broadcast_arrays(places_m[:, None], focus_m[None]))
+    offset_m = np.swapaxes(bounds.point_m[:, :, :SIGHT_POINTS], 0, 1) - places_m[:, None, None, None]
+    in_camera_m = np.einsum("nfji,nfalj->nfali", world_from_camera[..., :3, :3], offset_m)
+    reach = IMAGE_SHARE * np.tan(0.5 * wish.fov_rad) * np.array([1.0, aspect]) * in_camera_m[..., 2:]
+    return np.asarray((np.abs(in_camera_m[..., :2]) < reach).all(axis=-1))
 
 
 def _size_cost(
-    places_m: Float64[np.ndarray, "N 3"], wish: ViewWish, bounds: ActorBounds, weight: Float64[np.ndarray, "M A"]
-) -> Float64[np.ndarray, "N M"]:
+    places_m: Float64[np.ndarray, "N 3"], wish: ViewWish, bounds: ActorBounds
+) -> Float64[np.ndarray, "N F A"]:
     distance_m = np.linalg.norm(places_m[:, None, None] - bounds.chest_m, axis=-1)
     size = bounds.height_m / (2.0 * np.maximum(distance_m, 0.3) * np.tan(0.5 * wish.fov_rad))
     wrong = np.maximum(np.log(wish.framing.least_size / size), np.log(size / wish.framing.most_size))
-    return np.einsum("nam,ma->nm", np.maximum(wrong, 0.0) ** 2, weight) * 4.0
+    return np.asarray(4.0 * np.swapaxes(np.maximum(wrong, 0.0) ** 2, 1, 2))
 
 
 def _crowd_cost(
-    places_m: Float64[np.ndarray, "N 3"], nearby: ActorBounds, knots: int, clearance_m: float
-) -> Float64[np.ndarray, "N M"]:
-    """Too near an actor at a knot or on the way to its neighbours."""
-    distance_m = capsule_distance_m(places_m[:, None], nearby).min(axis=0)
-    lacking = np.maximum(clearance_m + 0.25 - distance_m, 0.0) / (clearance_m + 0.25)
-    around = [lacking[:, max(0, 4 * k - 2) : 4 * k + 3].max(axis=1) for k in range(knots)]
-    return 15.0 * np.stack(around, axis=1) ** 2
+    places_m: Float64[np.ndarray, "N 3"], bounds: ActorBounds, clearance_m: float
+) -> Float64[np.ndarray, "N F"]:
+    """Too near an actor."""
+    distance_m = capsule_distance_m(places_m[:, None], bounds).min(axis=0)
+    return 15.0 * (np.maximum(clearance_m + 0.25 - distance_m, 0.0) / (clearance_m + 0.25)) ** 2
 
 
-def _step_cost(
-    places_m: Float64[np.ndarray, "N 3"],
-    focus_m: Float64[np.ndarray, "M 3"],
-    wish: ViewWish,
-    field: SignedDistanceField,
-    knot_s: float,
-    config: CamerasConfig,
-) -> Float64[np.ndarray, "K N N"]:
-    """Cost of going from place i to place j in each interval between knots."""
-    step_m = places_m[None] - places_m[:, None]
-    length_m = np.linalg.norm(step_m, axis=-1)
+def _length_cost(length_m: Float64[np.ndarray, "N N"], wish: ViewWish, knot_s: float) -> Float64[np.ndarray, "N N"]:
+    if wish.speed_mps == 0.0:
+        return STILL_COST_PER_M * length_m
     wished_m = wish.speed_mps * knot_s
-    cost = ((length_m - wished_m) / wished_m) ** 2 + BLOCKED_COST * _blocked(places_m, step_m, field, config)
-    unit = step_m / np.maximum(length_m, 1e-6)[..., None]
-    return np.stack([cost + _style_cost(places_m, unit, focus_m[k : k + 2], wish) for k in range(len(focus_m) - 1)])
+    return ((length_m - wished_m) / wished_m) ** 2
 
 
 def _style_cost(
@@ -148,8 +258,10 @@ def _blocked(
     return np.asarray((distance_at_m(field, places_m[:, None] + share * step_m) < config.scene_clearance_m).any(axis=0))
 
 
-def _cheapest_chain(place_cost: Float64[np.ndarray, "N M"], step_cost: Float64[np.ndarray, "K N N"]) -> list[int]:
-    """Viterbi's algorithm: the places, one per knot, with the least sum of place and step costs."""
+def _cheapest_chain(
+    place_cost: Float64[np.ndarray, "N M"], step_cost: Float64[np.ndarray, "K N N"]
+) -> tuple[list[int], float]:
+    """Viterbi's algorithm: the places, one per knot, with the least sum of place and step costs; and that sum."""
     total = place_cost[:, 0]
     before: list[np.ndarray] = []
     for knot in range(1, place_cost.shape[1]):
@@ -159,4 +271,4 @@ def _cheapest_chain(place_cost: Float64[np.ndarray, "N M"], step_cost: Float64[n
     chain = [int(np.argmin(total))]
     for previous in reversed(before):
         chain.append(int(previous[chain[-1]]))
-    return chain[::-1]
+    return chain[::-1], float(total.min())

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 
 from perpetua.actors.types import ActorMesh
 from perpetua.cameras.types import CameraPath
@@ -13,6 +13,7 @@ from perpetua.geometry.transforms import invert_rigid, transform_points
 
 POINTS = 16
 UPPER_BODY_LEVEL = 0.5
+SEEN_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -20,11 +21,17 @@ class ViewCoverage:
     """What C views show of A actors over T frames.
 
     ``seen_share`` is the share of an actor's head and torso points that lie inside the image with no triangle of
-    the room between. ``apart_rad`` is the angle at each actor between its two most different views, in the plane.
+    the room between. ``apart_rad`` is the angle at each actor, in the plane, between the two most different of the
+    views that see it: at least ``SEEN_SHARE`` of it. Where fewer than two do it is NaN.
     """
 
     seen_share: Float64[np.ndarray, "C T A"]
     apart_rad: Float64[np.ndarray, "T A"]
+
+    @property
+    def sees(self) -> Bool[np.ndarray, "C T A"]:
+        """Which views see which actors."""
+        return np.asarray(self.seen_share >= SEEN_SHARE)
 
 
 def view_coverage(paths: tuple[CameraPath, ...], actors: tuple[ActorMesh, ...], caster: Caster) -> ViewCoverage:
@@ -32,7 +39,7 @@ def view_coverage(paths: tuple[CameraPath, ...], actors: tuple[ActorMesh, ...], 
     points_m = np.stack([_upper_body_m(actor) for actor in actors], axis=1)
     seen = np.stack([_seen_share(path, points_m, caster) for path in paths])
     positions_m = np.stack([path.world_from_camera[:, :3, 3] for path in paths])
-    return ViewCoverage(seen, _apart_rad(positions_m, points_m.mean(axis=2)))
+    return ViewCoverage(seen, _apart_rad(positions_m, points_m.mean(axis=2), seen >= SEEN_SHARE))
 
 
 def _upper_body_m(actor: ActorMesh) -> Float64[np.ndarray, "T N 3"]:
@@ -55,9 +62,12 @@ def _seen_share(path: CameraPath, points_m: Float64[np.ndarray, "T A N 3"], cast
 
 
 def _apart_rad(
-    positions_m: Float64[np.ndarray, "C T 3"], middle_m: Float64[np.ndarray, "T A 3"]
+    positions_m: Float64[np.ndarray, "C T 3"],
+    middle_m: Float64[np.ndarray, "T A 3"],
+    sees: Bool[np.ndarray, "C T A"],
 ) -> Float64[np.ndarray, "T A"]:
     offset = positions_m[:, :, None, :2] - middle_m[None, :, :, :2]
     azimuth = np.arctan2(offset[..., 1], offset[..., 0])
     between = np.abs(azimuth[:, None] - azimuth[None])
-    return np.asarray(np.minimum(between, 2.0 * np.pi - between).max(axis=(0, 1)))
+    between = np.where(sees[:, None] & sees[None], np.minimum(between, 2.0 * np.pi - between), 0.0)
+    return np.where(sees.sum(axis=0) >= 2, between.max(axis=(0, 1)), np.nan)

@@ -1,4 +1,4 @@
-"""What each view is to be like: lens, framing, height, way of moving, direction and focus, drawn from the seed."""
+"""What each view is to be like: lens, framing, height, way of moving and direction, drawn from the seed."""
 
 from dataclasses import dataclass
 from typing import TypeVar
@@ -6,9 +6,8 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float64
 
-from perpetua.cameras.bodies import BODY_LEVELS, ActorBounds
+from perpetua.cameras.bodies import BODY_LEVELS
 from perpetua.cameras.config import CamerasConfig, Framing, Height, Style
-from perpetua.cameras.focus import FocusSchedule, draw_focus
 from perpetua.seeding import StageSeed
 
 Option = TypeVar("Option")
@@ -18,11 +17,17 @@ SWAY_HZ = (0.3, 1.6)
 
 @dataclass(frozen=True)
 class FramingWish:
-    """Projected height of an actor over the image's height, and how many body points from the head down show."""
+    """How an actor is framed.
+
+    Projected height over the image's height, how many body points from the head down show, and which part of the
+    configured range of lenses, from its narrowest (0) to its widest (1), serves that: a close view from close by
+    would be crowded.
+    """
 
     least_size: float
     most_size: float
     points: int
+    lens: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -38,15 +43,16 @@ class StyleWish:
 
 
 FRAMINGS: dict[Framing, FramingWish] = {
-    "close": FramingWish(0.65, 1.10, 2),
-    "medium": FramingWish(0.42, 0.75, 4),
-    "wide": FramingWish(0.25, 0.50, 5),
+    "close": FramingWish(0.65, 1.10, 2, (0.0, 0.4)),
+    "medium": FramingWish(0.42, 0.75, 4, (0.3, 0.75)),
+    "wide": FramingWish(0.25, 0.50, 5, (0.65, 1.0)),
 }
 STYLES: dict[Style, StyleWish] = {
     "dolly": StyleWish(0.20, 0.40, 0.6, 0.0, 0.0, 0.15),
     "orbit": StyleWish(0.30, 0.60, 0.0, 0.8, 0.0, 0.15),
     "handheld": StyleWish(0.20, 0.45, 0.0, 0.0, 0.0, 1.0),
     "walk_along": StyleWish(0.35, 0.75, 0.0, 0.0, 0.8, 0.6),
+    "static": StyleWish(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 }
 
 
@@ -66,16 +72,16 @@ class Sway:
 
 @dataclass(frozen=True)
 class ViewWish:
-    """Everything one view of one candidate aims at; ``azimuth_rad`` is the direction from the actors to the view."""
+    """Everything one view of one candidate aims at but its focus; ``azimuth_rad`` is its direction from the actors."""
 
     camera: int
     fov_rad: float
     framing: FramingWish
+    grouping: Framing
     style: StyleWish
     height_m: tuple[float, float]
     speed_mps: float
     azimuth_rad: float
-    focus: FocusSchedule
     sway: Sway
 
 
@@ -83,15 +89,12 @@ def draw_wishes(
     seed: StageSeed,
     redraw: int,
     candidate: int,
-    bounds: ActorBounds,
     room_height_m: float,
-    duration_s: float,
     config: CamerasConfig,
 ) -> tuple[ViewWish, ...]:
-    """One candidate's wishes. Views start spread evenly around the actors, each with another focus and height."""
+    """One candidate's wishes. Views are spread evenly around the actors, each at another height."""
     shared = seed.stream("wishes", redraw, candidate)
     start_azimuth_rad = shared.uniform(0.0, 2.0 * np.pi)
-    leaders = shared.permutation(bounds.axis_m.shape[0])
     framings = _deal(shared, config.framings, config.count)
     heights = _deal(shared, config.heights, config.count)
     styles = _deal(shared, config.styles, config.count)
@@ -100,17 +103,18 @@ def draw_wishes(
         rng = seed.stream("wish", redraw, candidate, camera)
         style = STYLES[styles[camera]]
         turn = (camera + rng.uniform(-0.15, 0.15)) / config.count
-        leader = int(leaders[camera % len(leaders)])
+        framing = FRAMINGS[framings[camera]]
+        lens = rng.uniform(*framing.lens)
         wishes.append(
             ViewWish(
                 camera=camera,
-                fov_rad=float(np.radians(rng.uniform(config.min_fov_deg, max(config.min_fov_deg, config.max_fov_deg)))),
-                framing=FRAMINGS[framings[camera]],
+                fov_rad=float(np.radians(config.min_fov_deg + lens * (config.max_fov_deg - config.min_fov_deg))),
+                framing=framing,
+                grouping=framings[camera],
                 style=style,
                 height_m=_height_band_m(heights[camera], room_height_m),
                 speed_mps=float(rng.uniform(style.least_mps, style.most_mps)),
                 azimuth_rad=float(start_azimuth_rad + 2.0 * np.pi * turn),
-                focus=draw_focus(rng, bounds, duration_s, leader, framings[camera]),
                 sway=_draw_sway(rng, config, style.sway),
             )
         )

@@ -1,5 +1,7 @@
 """A path that keeps every rule passes; each planted fault is found, by its rule and value."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from camera_scene import camera_path, camera_room, walker
@@ -7,6 +9,7 @@ from jaxtyping import Float64
 
 from perpetua.cameras.audit import CameraAudit, audit_paths
 from perpetua.cameras.config import CamerasConfig
+from perpetua.cameras.moving_mesh import MovingMesh
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.raycast import Caster
 
@@ -29,8 +32,10 @@ def _audit(
 ) -> CameraAudit:
     actors = (walker(0, _line(np.array([1.5, 0.5, 0.0]), np.array([1.2, 0.9, 0.0]))[:, :2]),)
     focus = np.ones((1, FRAMES, 1), bool)
-    config = CamerasConfig(min_focus_share=min_focus_share)
-    return audit_paths((camera_path(position_m, target_m),), focus, ROOM, actors, CASTER, FPS, config)
+    meshes = tuple(MovingMesh(actor) for actor in actors)
+    paths = (camera_path(position_m, target_m),)
+    config = CamerasConfig(count=1, min_focus_share=min_focus_share)
+    return audit_paths(paths, focus, ROOM, actors, meshes, CASTER, FPS, config)
 
 
 def _only_rule(audit: CameraAudit) -> str:
@@ -77,7 +82,8 @@ def test_distance_to_an_actor_is_the_least_of_all_sub_steps() -> None:
     walk_m = _line(np.array([-0.9, 0.9, 0.0]), np.array([-1.9, 0.8, 0.0]))
     actor = walker(0, walk_m[:, :2])
     focus = np.ones((1, FRAMES, 1), bool)
-    audit = audit_paths((camera_path(camera_m, TARGET_M),), focus, ROOM, (actor,), CASTER, FPS, CamerasConfig())
+    paths, meshes = (camera_path(camera_m, TARGET_M),), (MovingMesh(actor),)
+    audit = audit_paths(paths, focus, ROOM, (actor,), meshes, CASTER, FPS, CamerasConfig(count=1))
     share = np.linspace(0.0, 1.0, 8 * (FRAMES - 1) + 1)[:, None]
     between_m = (1.0 - share) * (camera_m[0] - walk_m[0]) + share * (camera_m[-1] - walk_m[-1])
     still = Caster(TriMesh(walker(0, np.zeros((1, 2))).vertices_m[0].astype(np.float64), actor.faces))
@@ -119,3 +125,51 @@ def test_too_quick_a_turn() -> None:
     audit = _audit(_line(START_M, END_M), np.array([-2.2, 0.0, 1.4]), min_focus_share=0.0)
     assert _only_rule(audit) == "turn"
     assert audit.violations[0].value > 200.0
+
+
+def _two_views(second_target_m: Float64[np.ndarray, "3"], config: CamerasConfig) -> CameraAudit:
+    """Two views, 90 degrees apart at the actor; the first sees it."""
+    actors = (walker(0, np.tile([[1.0, 1.0]], (FRAMES, 1))),)
+    first_m, second_m = np.tile([-2.0, 1.0, 1.4], (FRAMES, 1)), np.tile([1.0, -1.6, 1.4], (FRAMES, 1))
+    paths = (camera_path(first_m, np.array([1.0, 1.0, 1.2])), camera_path(second_m, second_target_m))
+    meshes = tuple(MovingMesh(actor) for actor in actors)
+    focus = np.ones((2, FRAMES, 1), bool)
+    return audit_paths(paths, focus, ROOM, actors, meshes, CASTER, FPS, config)
+
+
+def test_an_actor_seen_by_too_few_views() -> None:
+    config = CamerasConfig(count=4, min_focus_share=0.0, min_apart_deg=0.0)
+    audit = _two_views(np.array([3.0, -1.6, 1.2]), config)
+    assert _only_rule(audit) == "coverage"
+    assert audit.violations[0].subject == "actor 0" and audit.covered_share.tolist() == [0.0]
+
+
+def test_views_of_an_actor_from_too_like_directions() -> None:
+    seen_m = np.array([1.0, 1.0, 1.2])
+    audit = _two_views(seen_m, CamerasConfig(count=4, min_apart_deg=89.0))
+    assert audit.passed and audit.covered_share.tolist() == [1.0]
+    assert audit.apart_deg[0] == pytest.approx(90.0, abs=0.5)
+    audit = _two_views(seen_m, CamerasConfig(count=4, min_apart_deg=91.0))
+    assert _only_rule(audit) == "apart"
+
+
+def test_distance_to_a_deforming_mesh_is_exact() -> None:
+    """Every vertex goes its own way; each sub-step is compared with a plain search over all triangles."""
+    rng = np.random.default_rng(0)
+    actor = walker(0, np.zeros((4, 2)))
+    actor = replace(
+        actor, vertices_m=actor.vertices_m + rng.normal(0.0, 0.05, actor.vertices_m.shape).astype(np.float32)
+    )
+    points_m = rng.uniform((0.4, -0.5, 0.2), (1.5, 0.5, 2.2), (40, 3))
+    frame, share = rng.integers(0, 3, 40).astype(np.int32), rng.uniform(0.0, 1.0, 40)
+    between_m = (
+        actor.vertices_m[frame] * (1.0 - share[:, None, None]) + actor.vertices_m[frame + 1] * share[:, None, None]
+    )
+    exact_m = [
+        Caster(TriMesh(vertices_m, actor.faces)).closest_distance(point_m[None])[0]
+        for vertices_m, point_m in zip(between_m, points_m, strict=True)
+    ]
+    mesh = MovingMesh(actor)
+    found_m = [mesh.least_distance_m(points_m[i : i + 1], frame[i : i + 1], share[i : i + 1]) for i in range(40)]
+    np.testing.assert_allclose(found_m, exact_m, atol=1e-5)
+    assert mesh.least_distance_m(points_m, frame, share) == min(found_m)

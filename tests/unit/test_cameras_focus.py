@@ -44,19 +44,27 @@ def test_schedules_cover_the_sequence(seed: int, duration_s: float, first: int, 
     assert max(later - before for before, later in pairwise([*starts_s, duration_s])) <= 8.0
 
 
-def test_views_differ_in_direction_focus_and_height() -> None:
-    wishes = draw_wishes(StageSeed(3, 0, "cameras"), 0, 0, BOUNDS, 2.6, 10.0, CamerasConfig())
+def test_views_differ_in_direction_height_and_style() -> None:
+    wishes = draw_wishes(StageSeed(3, 0, "cameras"), 0, 0, 2.6, CamerasConfig())
     turn = np.array([wish.azimuth_rad for wish in wishes])
     assert np.degrees(np.diff(turn)).min() > 60.0
     assert len({wish.height_m for wish in wishes}) == 4
     assert len({wish.style for wish in wishes}) == 4
-    fov_deg = [np.degrees(wish.fov_rad) for wish in wishes]
-    assert len(set(fov_deg)) == 4 and min(fov_deg) >= 55.0 and max(fov_deg) <= 80.0
+
+
+def test_lenses_fit_the_framing_within_the_configured_range() -> None:
+    lenses_deg: dict[str, list[float]] = {"close": [], "medium": [], "wide": []}
+    for candidate in range(30):
+        for wish in draw_wishes(StageSeed(3, 0, "cameras"), 0, candidate, 2.6, CamerasConfig()):
+            lenses_deg[wish.grouping].append(float(np.degrees(wish.fov_rad)))
+    assert min(lenses_deg["close"]) >= 35.0 and max(lenses_deg["wide"]) <= 90.0
+    assert min(lenses_deg["close"]) < 37.0 and max(lenses_deg["wide"]) > 88.0
+    assert max(lenses_deg["close"]) < 60.0 < 70.0 < min(lenses_deg["wide"])
 
 
 def test_wishes_come_from_the_seed_alone() -> None:
     def drawn(seed: int, candidate: int) -> list[float]:
-        wishes = draw_wishes(StageSeed(seed, 0, "cameras"), 0, candidate, BOUNDS, 2.6, 10.0, CamerasConfig())
+        wishes = draw_wishes(StageSeed(seed, 0, "cameras"), 0, candidate, 2.6, CamerasConfig())
         return [wish.azimuth_rad for wish in wishes] + [wish.speed_mps for wish in wishes]
 
     assert drawn(3, 1) == drawn(3, 1)
@@ -65,7 +73,7 @@ def test_wishes_come_from_the_seed_alone() -> None:
 
 def test_sway_stays_within_its_amplitude() -> None:
     config = CamerasConfig(styles=("handheld",), sway_m=0.02, sway_deg=1.0)
-    (wish, *_) = draw_wishes(StageSeed(0, 0, "cameras"), 0, 0, BOUNDS, 2.6, 10.0, config)
+    (wish, *_) = draw_wishes(StageSeed(0, 0, "cameras"), 0, 0, 2.6, config)
     sway = np.abs(wish.sway.at(np.linspace(0.0, 60.0, 5000))).max(axis=0)
     assert (sway[:3] <= 0.02).all() and (sway[3:] <= np.radians(1.0)).all()
     assert (sway[:3] > 0.008).all()

@@ -79,14 +79,42 @@ def test_coverage_asks_for_as_many_views_as_wanted() -> None:
     fov = TAN_HALF_FOV.expand(1, 3, 2)
     two = torch.cat([_points(place) for place in (seen, hidden, seen)], dim=1)
     one = torch.cat([_points(place) for place in (seen, hidden, hidden)], dim=1)
-    assert float(losses.coverage(two, fov, 2, 0.1)) == 0.0
-    assert float(losses.coverage(one, fov, 2, 0.1)) > 0.1
+    clear = torch.zeros(1, 3, 1, 1, dtype=torch.float64)
+    assert float(losses.coverage(two, fov, clear, 2, 0.1)) == 0.0
+    assert 0.4 < float(losses.coverage(one, fov, clear, 2, 0.1)) <= 0.5
+    assert float(losses.coverage(one, fov, clear, 1, 0.1)) == float(losses.coverage(one, fov, clear, 0, 0.1)) == 0.0
 
 
-def test_occlusion_counts_samples_near_the_scene() -> None:
-    open_line, blocked = torch.full((1, 1, 1, 1, 5), 0.5), torch.tensor([0.5, 0.3, 0.0, 0.3, 0.5])
-    assert float(losses.occlusion(open_line, 0.12)) == 0.0
-    assert float(losses.occlusion(blocked[None, None, None, None], 0.12)) == pytest.approx(1.0)
+def test_coverage_asks_for_a_clear_line_of_sight() -> None:
+    two, fov = _points((0.0, 0.0, 2.0)).expand(1, 2, 1, 1, 1, 3), TAN_HALF_FOV.expand(1, 2, 2)
+    one_blocked = torch.tensor([0.0, 1.0], dtype=torch.float64)[None, :, None, None]
+    assert float(losses.coverage(two, fov, one_blocked, 1, 0.1)) == 0.0
+    assert float(losses.coverage(two, fov, one_blocked, 2, 0.1)) == pytest.approx(0.5 / 1.15)
+
+
+def test_blocked_counts_samples_near_the_scene() -> None:
+    lines_m = torch.tensor([[0.5, 0.3, 0.5], [0.5, 0.0, 0.5], [0.06, 0.3, 0.5], [-0.9, -0.9, -0.9]])
+    found = losses.blocked(lines_m[None, None, None], 0.12).flatten()
+    torch.testing.assert_close(found, torch.tensor([0.0, 0.25, 0.0625, 1.0]))
+
+
+def test_occlusion_counts_the_focus_only() -> None:
+    blocked, focus = _row(1.0, 0.0)[:, :, None], _row(0.0, 1.0)[:, :, None]
+    assert float(losses.occlusion(blocked, focus)) == 0.0
+    assert float(losses.occlusion(blocked, 1.0 - focus)) == 1.0
+
+
+def test_foreground_counts_large_actors_in_the_image() -> None:
+    height_m = torch.full((1, 1), 1.8, dtype=torch.float64)
+
+    def foreground(point: tuple[float, float, float]) -> float:
+        return float(losses.foreground(_points(point), height_m, TAN_HALF_FOV, 1.3))
+
+    # 1.8 m fill the image 1.3 times at 1.54 m, twice that at half of it.
+    assert foreground((0.0, 0.0, 1.6)) == 0.0
+    assert foreground((0.0, 0.0, 0.77)) == pytest.approx(np.log(2.0 * 1.5385 / 1.54) ** 2, rel=1e-3)
+    assert foreground((0.0, 0.0, -0.7)) < 0.1 * foreground((0.0, 0.0, 0.7))
+    assert foreground((0.0, 0.0, 1.2)) < foreground((0.0, 0.0, 0.6))
 
 
 def test_crowding_counts_others_on_the_line_of_sight_only() -> None:
@@ -170,7 +198,10 @@ def _smooth_cases() -> dict[str, Callable[[Tensor], Tensor]]:
         "capsule": lambda p: losses.clearance(losses.capsule_distance(p, axis_m, bottom_m, height_m, bottom_m), 2.0),
         "framing": lambda p: losses.framing(sight(p), fov, weight[..., None].expand(1, 2, 5, 2, 2), 0.1),
         "size": lambda p: losses.size(sight(p)[..., 0, :].norm(dim=-1), height_m, fov, 2.0 * wish, 3.0 * wish, weight),
-        "coverage": lambda p: losses.coverage(sight(p), fov, 1, 0.1),
+        "coverage": lambda p: losses.coverage(sight(p), fov, p[..., :2].square(), 1, 0.1),
+        "blocked": lambda p: losses.blocked(p[..., None, :].expand(1, 2, 5, 2, 3), 0.8).sum().unsqueeze(0),
+        "occlusion": lambda p: losses.occlusion(p[..., :2].square(), weight),
+        "foreground": lambda p: losses.foreground(sight(p), height_m, fov, 0.5),
         "crowding": lambda p: losses.crowding(p, 2.0 * p + 1.0, body_m, other, 1.5),
         "travel": lambda p: losses.travel(p, 0.7, 3.0 * wish),
         "revisiting": lambda p: losses.revisiting(p, 1.0),
