@@ -1,6 +1,13 @@
-"""What every motion source keeps, on every kind of route and at every frame rate."""
+"""What every motion source keeps, on every kind of route and at every frame rate.
 
+A source that needs files or programs has a module of its name in ``motion_setups`` with ``motion_config(folder)``,
+which makes them in ``folder`` and returns the config that uses them.
+"""
+
+import importlib.util
 import sys
+import tempfile
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,9 +32,35 @@ kinds = pytest.mark.parametrize("kind", ROUTE_KINDS)
 rates = pytest.mark.parametrize("fps", [12.0, 24.0, 30.0])
 
 
+SETUPS = Path(__file__).parent / "motion_setups"
+CONFIGS: dict[str, MotionConfig] = {}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _configs() -> Iterator[None]:
+    with tempfile.TemporaryDirectory() as folder:
+        for source in MOTION_SOURCES:
+            CONFIGS[source] = _sample_config(source, Path(folder) / source)
+        yield
+
+
+def _sample_config(source: str, folder: Path) -> MotionConfig:
+    setup = SETUPS / f"{source}.py"
+    if not setup.exists():
+        return MotionConfig(source=source)
+    folder.mkdir()
+    spec = importlib.util.spec_from_file_location(f"motion_setup_{source}", setup)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    config = module.motion_config(folder)
+    assert isinstance(config, MotionConfig) and config.source == source
+    return config
+
+
 def _make(source: str, route: Route, fps: float, action: str = "walks") -> BodyMotion:
     told = replace(route, description=action)
-    return MOTION_SOURCES[source]().make(told, SKELETON, ROOM, fps, MotionConfig(source=source), SEED)
+    return MOTION_SOURCES[source]().make(told, SKELETON, ROOM, fps, CONFIGS[source], SEED)
 
 
 @sources
@@ -102,9 +135,7 @@ def test_the_same_arguments_give_the_same_bits_and_other_seeds_another_motion(so
     first, again = _make(source, route, 24.0), _make(source, route, 24.0)
     assert first.world_from_joint.tobytes() == again.world_from_joint.tobytes()
     assert first.pelvis_m.tobytes() == again.pelvis_m.tobytes()
-    other = MOTION_SOURCES[source]().make(
-        route, SKELETON, ROOM, 24.0, MotionConfig(source=source), StageSeed(12, 2, "motion")
-    )
+    other = MOTION_SOURCES[source]().make(route, SKELETON, ROOM, 24.0, CONFIGS[source], StageSeed(12, 2, "motion"))
     assert (first.contacts != other.contacts).any()
 
 

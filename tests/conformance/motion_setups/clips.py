@@ -1,0 +1,27 @@
+"""Clips for the conformance suite: walks of the procedural source, written as AMASS writes them."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "unit"))
+
+from motion_files import write_amass
+from motion_samples import empty_room, sample_route, sample_skeleton
+
+from perpetua.actors.config import ClipsConfig, MotionConfig
+from perpetua.actors.motion import MOTION_SOURCES
+from perpetua.seeding import StageSeed
+
+_DESCRIPTIONS = {"walk.npz": "walks", "walk_talk_phone.npz": "walks while talking on the phone"}
+
+
+def motion_config(folder: Path) -> MotionConfig:
+    """The source's config, with the files it reads in ``folder``."""
+    skeleton, fps = sample_skeleton(), 30.0
+    for name, description in _DESCRIPTIONS.items():
+        route = replace(sample_route("curve", fps, 12.0), description=description)
+        seed = StageSeed(5, 0, "clips")
+        motion = MOTION_SOURCES["procedural"]().make(route, skeleton, empty_room(), fps, MotionConfig(), seed)
+        write_amass(folder / name, motion)
+    return MotionConfig(source="clips", clips=ClipsConfig(folder=str(folder)))
