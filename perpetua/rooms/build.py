@@ -4,13 +4,13 @@ import logging
 from collections import Counter
 from pathlib import Path
 
-from perpetua.errors import RoomError
+from perpetua.errors import InputError, PerpetuaError, RoomError
 from perpetua.navigation.config import NavigationConfig
 
 # Each source enters itself in ROOM_SOURCES when it is imported.
-from perpetua.rooms import infinigen, procedural  # noqa: F401
+from perpetua.rooms import infinigen, procedural, scene_file  # noqa: F401
 from perpetua.rooms.acceptance import RoomRejected, check_room
-from perpetua.rooms.config import RoomsConfig
+from perpetua.rooms.config import RoomKind, RoomsConfig
 from perpetua.rooms.source import ROOM_SOURCES, draw_wish
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
@@ -23,21 +23,32 @@ def build_room(config: RoomsConfig, navigation: NavigationConfig, seed: StageSee
 
     Raises:
         RoomError: ``rooms.max_redraws`` further draws were rejected too; the reasons are counted in the message.
+        InputError: the user gave the source a number of scenes, and each was rejected; the message says why.
     """
     source = ROOM_SOURCES[config.source]()
+    limit = source.draws(config)
+    attempts = config.max_redraws + 1 if limit is None else min(limit, config.max_redraws + 1)
     kind = config.kinds[int(seed.stream("kind").integers(len(config.kinds)))]
-    reasons: Counter[str] = Counter()
-    for attempt in range(config.max_redraws + 1):
+    rejections: list[RoomRejected] = []
+    for attempt in range(attempts):
+        wish = draw_wish(kind, config, seed.stream("wish", attempt))
         try:
-            wish = draw_wish(kind, config, seed.stream("wish", attempt))
             room = source.make(wish, config, seed, attempt, scratch)
             check_room(room, config, navigation)
             return room
         except RoomRejected as rejection:
             logger.info("draw %d of a %s rejected: %s", attempt, kind, rejection)
-            reasons[rejection.rule] += 1
-    counts = ", ".join(f"{rule} ({count} x)" for rule, count in reasons.most_common())
-    raise RoomError(
-        f"none of {config.max_redraws + 1} draws of a {kind} was acceptable: {counts}; raise rooms.max_redraws or "
+            rejections.append(rejection)
+    raise _give_up(rejections, kind, limit)
+
+
+def _give_up(rejections: list[RoomRejected], kind: RoomKind, limit: int | None) -> PerpetuaError:
+    if limit is not None:
+        reasons = "\n".join(str(rejection) for rejection in rejections)
+        return InputError(f"no room came of {len(rejections)} of {limit} scene(s):\n{reasons}")
+    counted = Counter(rejection.rule for rejection in rejections).most_common()
+    counts = ", ".join(f"{rule} ({count} x)" for rule, count in counted)
+    return RoomError(
+        f"none of {len(rejections)} draws of a {kind} was acceptable: {counts}; raise rooms.max_redraws or "
         "rooms.min_side_m, or lower rooms.min_free_floor_m2"
     )

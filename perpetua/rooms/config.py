@@ -10,10 +10,31 @@ RoomKind = Literal["bathroom", "bedroom", "diningroom", "kitchen", "livingroom"]
 Daytime = Literal["day", "evening", "night"]
 
 
+class SceneFileConfig(Section):
+    """The scene file that rooms.source 'file' reads."""
+
+    path: str | None = Field(
+        None, description="a .blend, .glb, .gltf or .obj file, or a folder with some, from which the seed picks"
+    )
+    kind: RoomKind | Literal["scene"] = Field(
+        "scene", description="what the rooms are; 'scene' for anything: then nothing says what must be in it"
+    )
+    metres_per_unit: float | None = Field(
+        None, gt=0.0, le=10_000.0, description="length of one unit of the file, metres; none: as the file says, else 1"
+    )
+    up_axis: Literal["auto", "y", "z"] = Field(
+        "auto", description="the file's axis that points up; auto: y in glTF and OBJ, z in .blend"
+    )
+    floor_z_m: float | None = Field(
+        None, description="height of the floor in the file, metres along the up axis; none: it is found"
+    )
+    max_file_mb: float = Field(500.0, gt=0.0, description="largest file that is opened, with what it refers to, MB")
+
+
 class RoomsConfig(Section):
     """Where rooms come from and what makes one acceptable."""
 
-    source: str = Field("infinigen", description="room source: infinigen or procedural")
+    source: str = Field("infinigen", description="room source: infinigen, procedural or file")
     kinds: tuple[RoomKind, ...] = Field(
         ("bathroom", "bedroom", "diningroom", "kitchen", "livingroom"),
         description="room kinds to draw from",
@@ -37,6 +58,7 @@ class RoomsConfig(Section):
     max_redraws: int = Field(5, ge=0, le=50, description="further rooms tried when one is rejected")
     timeout_s: float = Field(600.0, ge=10.0, description="longest time to generate one room, seconds")
     max_triangles: int = Field(3_000_000, ge=1000, description="triangles allowed in one room")
+    file: SceneFileConfig = Field(default_factory=SceneFileConfig)
 
     @model_validator(mode="after")
     def _check_order(self) -> "RoomsConfig":

@@ -23,6 +23,10 @@ SIDE_SCALE: dict[RoomKind, float] = {"bathroom": 0.8}
 class InfinigenRooms:
     """Furnished rooms by Infinigen Indoors 2 (https://infinigen.org)."""
 
+    def draws(self, config: RoomsConfig) -> int | None:
+        """Without end."""
+        return None
+
     def make(self, wish: RoomWish, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
         """A room as wished, with its ``room.blend`` in ``scratch``.
 

@@ -41,6 +41,14 @@ def draw_wish(kind: RoomKind, config: RoomsConfig, rng: np.random.Generator) -> 
 class RoomSource(Protocol):
     """Makes one room; the same arguments give the same room, bit for bit."""
 
+    def draws(self, config: RoomsConfig) -> int | None:
+        """How many different draws there are; None where they never end.
+
+        Raises:
+            InputError: the config asks for what this source cannot make.
+        """
+        ...
+
     def make(self, wish: RoomWish, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
         """A room as wished.
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
+from room_sample import sample_of
 
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
@@ -18,28 +18,22 @@ from perpetua.seeding import StageSeed
 
 NAVIGATION = NavigationConfig()
 SEED = StageSeed(3, 1, "room")
-# Sources that make each room in a Blender process of their own show one kind here.
-BLENDER_SOURCES = {"infinigen": ("bathroom",)}
-Made = tuple[str, RoomKind, Room, NavGrid]
+Made = tuple[RoomsConfig, RoomKind, Room, NavGrid]
 
 
 def _cases() -> Iterator[object]:
     for source in ROOM_SOURCES:
-        slow = source in BLENDER_SOURCES
-        marks = [pytest.mark.slow, pytest.mark.blender, pytest.mark.infinigen] if slow else []
-        for kind in BLENDER_SOURCES.get(source, get_args(RoomKind)):
-            yield pytest.param((source, kind), id=f"{source}-{kind}", marks=marks)
-
-
-def _make(source: str, kind: RoomKind, scratch: Path) -> Room:
-    return build_room(RoomsConfig(source=source, kinds=(kind,)), NAVIGATION, SEED, scratch)
+        sample = sample_of(source)
+        for kind in sample.kinds:
+            yield pytest.param((source, kind), id=f"{source}-{kind}", marks=sample.marks)
 
 
 @pytest.fixture(scope="module", params=list(_cases()))
 def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Made:
     source, kind = request.param
-    room = _make(source, kind, tmp_path_factory.mktemp("room"))
-    return source, kind, room, build_nav_grid(room, NAVIGATION)
+    config = sample_of(source).config(source, kind, tmp_path_factory.mktemp("given"))
+    room = build_room(config, NAVIGATION, SEED, tmp_path_factory.mktemp("room"))
+    return config, kind, room, build_nav_grid(room, NAVIGATION)
 
 
 def test_room_is_of_the_kind_and_large_enough(made: Made) -> None:
@@ -111,8 +105,8 @@ def test_light_comes_from_lamps_or_from_the_blend(made: Made) -> None:
 
 
 def test_same_seed_same_room(made: Made, tmp_path: Path) -> None:
-    source, kind, room, _ = made
-    again = _make(source, kind, tmp_path)
+    config, _, room, _ = made
+    again = build_room(config, NAVIGATION, SEED, tmp_path)
     assert np.array_equal(room.floor_polygon_m, again.floor_polygon_m)
     assert room.lights == again.lights
     assert [thing.name for thing in room.objects] == [thing.name for thing in again.objects]
@@ -122,12 +116,23 @@ def test_same_seed_same_room(made: Made, tmp_path: Path) -> None:
         assert np.array_equal(first.mesh.faces, second.mesh.faces), first.name
 
 
-@pytest.mark.parametrize("source", sorted(set(ROOM_SOURCES) - set(BLENDER_SOURCES)))
+@pytest.mark.parametrize(
+    "source",
+    [
+        pytest.param(source, marks=sample.marks)
+        for source, sample in ((source, sample_of(source)) for source in ROOM_SOURCES)
+        if sample.many_draws
+    ],
+)
 def test_another_attempt_is_another_room(source: str, tmp_path: Path) -> None:
-    # A Blender source takes a minute per draw; its own tests show that the attempt reaches its job.
+    # Where a draw takes a minute, the source's own tests show that the attempt reaches its job.
+    kind = sample_of(source).kinds[0]
+    given = tmp_path / "given"
+    given.mkdir()
+    config = sample_of(source).config(source, kind, given)
     first, other = (
         ROOM_SOURCES[source]().make(
-            draw_wish("kitchen", RoomsConfig(), SEED.stream("wish", attempt)), RoomsConfig(), SEED, attempt, tmp_path
+            draw_wish(kind, config, SEED.stream("wish", attempt)), config, SEED, attempt, tmp_path
         )
         for attempt in (0, 1)
     )

@@ -15,6 +15,10 @@ from perpetua.seeding import StageSeed
 class ProceduralRooms:
     """Draws a plan (sizes, openings, furniture, materials, light), then builds it."""
 
+    def draws(self, config: RoomsConfig) -> int | None:
+        """Without end."""
+        return None
+
     def make(self, wish: RoomWish, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
         """A room as wished; nothing is written to ``scratch``.
 

@@ -1,0 +1,18 @@
+"""A folder with two glTF scenes of one kind."""
+
+from pathlib import Path
+
+import pytest
+from room_sample import RoomSample
+from scene_samples import procedural_room, write_scene
+
+from perpetua.rooms.config import RoomKind, RoomsConfig, SceneFileConfig
+
+
+def _two_scenes(source: str, kind: RoomKind, folder: Path) -> RoomsConfig:
+    for number in (0, 1):
+        write_scene(procedural_room(kind, number), folder / f"{kind}_{number}.glb")
+    return RoomsConfig(source=source, kinds=(kind,), file=SceneFileConfig(path=str(folder), kind=kind))
+
+
+SAMPLE = RoomSample(kinds=("livingroom", "kitchen"), config=_two_scenes, marks=(pytest.mark.blender,))
