@@ -100,8 +100,10 @@ class Skeleton:
     """A body's bones in the rest pose of ``BodyMotion`` (T-pose facing +X, soles on z = 0).
 
     ``joint_m`` holds the places of ``BODY_JOINTS``; ``contact_m`` the points of the soles named by ``CONTACTS``
-    (they move rigidly with the ankle for heels and with the foot joint for toes).
+    (they move rigidly with the ankle for heels and with the foot joint for toes). ``seat_m`` is how far below the hip
+    joints the body ends when it sits; None where it was not measured.
     """
 
     joint_m: Float64[np.ndarray, "22 3"]
     contact_m: Float64[np.ndarray, "4 3"]
+    seat_m: float | None = None

@@ -1,7 +1,7 @@
-"""What words make the upper body do.
+"""What words mean: which actions, in what manner, at what pace.
 
-The rule: a description is cut into clauses at commas, "and" and "while", a clause into words, each word reduced to
-its stem ("waving", "waves": "wav"). A clause means an action when one of the action's verbs occurs in it and, where
+The rule: a description is cut into clauses at commas, "and", "then" and "while", a clause into words, each word reduced
+to its stem ("waving", "waves": "wav"). A clause means an action when one of the action's verbs occurs in it and, where
 the action names things or body parts, one of those too. Several actions can be meant at once ("walks while talking on
 the phone and looking around"); where two want the same arm, the one said first has it. "left" or "right" in the clause
 moves a one-handed action to that side. Words of manner ("briskly", "tired") change how the whole body moves. Words of
@@ -13,49 +13,28 @@ import logging
 import re
 from dataclasses import dataclass, replace
 
+from perpetua.actors.motion.vocabulary import ACTIONS, Action, HandPose
+
 logger = logging.getLogger(__name__)
-
-Vector = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class HandReach:
-    """A hand held somewhere: (forward, outward, up) in the chest's frame.
-
-    ``wrist`` is relative to the shoulder, in lengths of the arm; ``elbow_towards`` is where the elbow stands out;
-    ``roll_rad`` turns the forearm about itself (negative: thumb side out); ``swing`` is how far the wrist moves to
-    and fro (lengths of the arm) at ``swing_hz``.
-    """
-
-    wrist: Vector
-    elbow_towards: Vector
-    roll_rad: float = 0.0
-    swing: Vector = (0.0, 0.0, 0.0)
-    swing_hz: float = 0.0
 
 
 @dataclass(frozen=True)
 class Performance:
-    """What the upper body does: arms that do not hang (left, right), how far the head wanders, and the manner."""
+    """The actions meant, in the order said, each for the side it is done with, and the manner of all motion."""
 
-    left: HandReach | None = None
-    right: HandReach | None = None
-    gaze_wander_rad: float = 0.12
-    gaze_pitch_rad: float = 0.0
+    actions: tuple[Action, ...] = ()
     lean_rad: float = 0.0
     arm_swing: float = 1.0
 
+    @property
+    def left(self) -> Action | None:
+        """The action that has the left arm."""
+        return next((action for action in self.actions if action.left is not None), None)
 
-@dataclass(frozen=True)
-class _Action:
-    """``verbs`` and ``things`` are stems; one-handed where ``left`` is None: then the right unless words say left."""
-
-    verbs: frozenset[str]
-    things: frozenset[str]
-    right: HandReach | None = None
-    left: HandReach | None = None
-    gaze_wander_rad: float | None = None
-    gaze_pitch_rad: float = 0.0
+    @property
+    def right(self) -> Action | None:
+        """The action that has the right arm."""
+        return next((action for action in self.actions if action.right is not None), None)
 
 
 def _stem(word: str) -> str:
@@ -73,47 +52,6 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(_stem(word) for word in text.split())
 
 
-_PHONE = HandReach((0.19, 0.03, 0.17), (0.3, 0.6, -1.0), roll_rad=-1.2)
-_SCREEN = HandReach((0.47, -0.22, -0.12), (-0.2, 0.45, -1.0), roll_rad=-0.8)
-_WAVE = HandReach((0.3, 0.2, 0.28), (0.1, 0.8, -1.0), swing=(0.0, 0.11, 0.0), swing_hz=1.5)
-_POINT = HandReach((0.93, 0.1, 0.02), (-0.3, 0.6, -1.0))
-_GESTURE = HandReach((0.45, 0.05, -0.3), (-0.5, 0.6, -1.0), swing=(0.06, 0.06, 0.06), swing_hz=0.8)
-_BOX = HandReach((0.56, 0.0, -0.36), (-0.6, 0.5, -1.0))
-_TRAY = HandReach((0.52, -0.05, -0.3), (-0.4, 0.5, -1.0), roll_rad=-1.3)
-# Of two hands that meet, one is in front of the other.
-_CROSSED = (
-    HandReach((0.46, -0.38, -0.28), (0.0, 0.7, -1.0)),
-    HandReach((0.34, -0.38, -0.36), (0.0, 0.7, -1.0)),
-)
-_ON_HIPS = HandReach((0.06, 0.1, -0.64), (-0.6, 1.0, 0.1))
-_BEHIND = (
-    HandReach((-0.44, -0.16, -0.72), (-0.4, 1.0, 0.1)),
-    HandReach((-0.36, -0.16, -0.76), (-0.4, 1.0, 0.1)),
-)
-_IN_FRONT = (
-    HandReach((0.44, -0.12, -0.6), (-0.5, 1.0, 0.0)),
-    HandReach((0.36, -0.12, -0.64), (-0.5, 1.0, 0.0)),
-)
-
-_ACTIONS: dict[str, _Action] = {
-    "talk on the phone": _Action(_words("talk speak call chat"), _words("phone telephone mobile"), _PHONE),
-    "look at the phone": _Action(
-        _words("look read type text check"), _words("phone screen message"), _SCREEN, None, 0.05, 0.3
-    ),
-    "wave a hand": _Action(_words("wave greet"), frozenset(), _WAVE),
-    "point ahead": _Action(_words("point"), frozenset(), _POINT),
-    "gesture with a hand": _Action(_words("gesture explain argue discuss"), frozenset(), _GESTURE),
-    "carry a box": _Action(_words("carry hold bring lift"), _words("box parcel crate basket"), _BOX, _BOX),
-    "carry a tray": _Action(_words("carry hold bring serve"), _words("tray plate dish"), _TRAY, _TRAY),
-    "cross the arms": _Action(_words("cross fold"), _words("arm"), *_CROSSED),
-    "hands on the hips": _Action(_words("hand put rest"), _words("hip waist"), _ON_HIPS, _ON_HIPS),
-    "hands behind the back": _Action(_words("hand clasp hold"), _words("behind back"), *_BEHIND),
-    "hands in front": _Action(_words("hand clasp hold"), _words("front belly"), *_IN_FRONT),
-    "look around": _Action(_words("look glance gaze watch"), _words("around about room"), gaze_wander_rad=0.55),
-    "look down": _Action(
-        _words("look glance gaze watch"), _words("down floor ground"), gaze_wander_rad=0.08, gaze_pitch_rad=0.35
-    ),
-}
 _GOING = _words("walk stroll go move pace wander step stride march amble saunter turn stand wait stop idle pause hurry")
 _PACE_VERBS = {
     "stand": _words("stand wait idle halt"),
@@ -141,7 +79,7 @@ _MANNERS: dict[str, tuple[float, float]] = {
 
 def known_actions() -> tuple[str, ...]:
     """Names of the actions that descriptions can mean."""
-    return tuple(_ACTIONS)
+    return tuple(ACTIONS)
 
 
 def stated_paces(description: str) -> frozenset[str]:
@@ -162,48 +100,69 @@ def wants_seat(description: str) -> bool:
     return any(stems & _SITTING for stems in _clauses(description))
 
 
-def _clauses(description: str) -> list[frozenset[str]]:
-    """The stems of the words of each clause."""
-    clauses = re.split(r"[,;.]|\band\b|\bwhile\b|\bthen\b", description.lower())
-    return [frozenset(_stem(word) for word in re.findall(r"[a-z]+", clause)) for clause in clauses]
+def mentioned_words(description: str) -> frozenset[str]:
+    """The stems of all words of a description."""
+    return frozenset().union(*_clauses(description))
+
+
+def names(stems: frozenset[str], category: str) -> bool:
+    """Whether words name a category of things, by any word of its name."""
+    return bool(stems & _words(category.replace("_", " ")))
 
 
 def perform(description: str) -> Performance:
-    """What a description in plain words asks of the upper body.
+    """What a description in plain words asks of the body.
 
     Words that mean nothing known are logged as a warning that names the nearest known actions; the body then walks.
     """
     performance = Performance()
     understood = False
     for stems in _clauses(description):
-        meant = [action for action in _ACTIONS.values() if stems & action.verbs and _mentions(stems, action)]
+        meant = [action for action in ACTIONS.values() if _means(stems, action)]
         manners = [effect for word, effect in _MANNERS.items() if _stem(word) in stems]
-        understood = understood or bool(meant or manners or stems & _GOING)
+        understood = understood or bool(meant or manners or stems & _GOING or stated_paces(" ".join(stems)))
         for lean_rad, swing in manners:
             performance = replace(
                 performance, lean_rad=performance.lean_rad + lean_rad, arm_swing=performance.arm_swing * swing
             )
         for action in meant:
-            performance = _with_action(performance, action, "left" in stems)
+            performance = _with_action(performance, action, stems)
     if not understood:
-        near = difflib.get_close_matches(description.lower(), _ACTIONS, n=3, cutoff=0.0)
+        near = difflib.get_close_matches(description.lower(), ACTIONS, n=3, cutoff=0.0)
         logger.warning("action '%s' is not understood, so the actor walks; the nearest known are %s", description, near)
     return performance
 
 
-def _mentions(stems: frozenset[str], action: _Action) -> bool:
-    return not action.things or bool(stems & action.things)
+def _clauses(description: str) -> list[frozenset[str]]:
+    """The stems of the words of each clause."""
+    clauses = re.split(r"[,;.]|\band\b|\bwhile\b|\bthen\b", description.lower())
+    return [frozenset(_stem(word) for word in re.findall(r"[a-z]+", clause)) for clause in clauses]
 
 
-def _with_action(performance: Performance, action: _Action, use_left: bool) -> Performance:
-    one_handed = action.left is None
-    wanted_left = action.left if not one_handed else (action.right if use_left else None)
-    wanted_right = None if one_handed and use_left else action.right
-    wander_rad = performance.gaze_wander_rad if action.gaze_wander_rad is None else action.gaze_wander_rad
+def _means(stems: frozenset[str], action: Action) -> bool:
+    things = _words(action.things)
+    return bool(stems & _words(action.verbs)) and (not things or bool(stems & things))
+
+
+def _with_action(performance: Performance, action: Action, stems: frozenset[str]) -> Performance:
+    """The performance with one more action: on the side that words name, and with the arms that are still free."""
+    one_handed = (action.left is None) != (action.right is None)
+    if one_handed:
+        pose = action.right if action.right is not None else action.left
+        on_left = "left" in stems if action.right is not None else "right" not in stems
+        action = replace(action, right=None if on_left else pose, left=pose if on_left else None)
     return replace(
         performance,
-        left=performance.left if performance.left is not None else wanted_left,
-        right=performance.right if performance.right is not None else wanted_right,
-        gaze_wander_rad=wander_rad,
-        gaze_pitch_rad=max(performance.gaze_pitch_rad, action.gaze_pitch_rad),
+        actions=(
+            *performance.actions,
+            replace(
+                action,
+                right=_free(action.right, performance.right),
+                left=_free(action.left, performance.left),
+            ),
+        ),
     )
+
+
+def _free(pose: HandPose | None, taken: Action | None) -> HandPose | None:
+    return pose if taken is None else None

@@ -5,12 +5,15 @@ from jaxtyping import Float64
 from scipy.interpolate import make_interp_spline
 from scipy.ndimage import gaussian_filter1d
 
+from perpetua.actors.motion.rotations import smoothstep
 from perpetua.actors.types import Route
 
 # Feet are planned this long before the first and after the last frame, so that both fall amid a step.
 MARGIN_S = 4.0
 _GRID_HZ = 100.0
 _END_VELOCITY_S = 0.25
+# People change from walking to running about here.
+_RUN_FROM_MPS, _RUN_FULLY_MPS = 1.85, 2.2
 
 
 class RoutePath:
@@ -64,6 +67,15 @@ class RoutePath:
     def speed_mps(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
         """Speed over the floor, smoothed over about a quarter of a second."""
         return np.interp(time_s, self._grid_s, self._speed_mps)
+
+    def run_share(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+        """From 0 (walking) to 1 (running)."""
+        return smoothstep((self.speed_mps(time_s) - _RUN_FROM_MPS) / (_RUN_FULLY_MPS - _RUN_FROM_MPS))
+
+    def stillness(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+        """From 0 (going or turning) to 1 (standing) at evenly spaced times."""
+        still = 1.0 - np.clip((self.speed_mps(time_s) + 0.3 * self.turn_rps(time_s)) / 0.25, 0.0, 1.0)
+        return np.asarray(gaussian_filter1d(still, 0.3 / (time_s[1] - time_s[0])))
 
     def turn_rps(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
         """Rate of turning, rad/s, never negative."""

@@ -6,21 +6,36 @@ Everything is planned as functions of time and evaluated on a fine grid that hol
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 from scipy.ndimage import gaussian_filter1d
 
 from perpetua.actors.config import MotionConfig
 from perpetua.actors.motion.actions import Performance, perform
-from perpetua.actors.motion.arms import ArmRotations, hanging_arm, reaching_arm
+from perpetua.actors.motion.bounce import nominal_height_m
 from perpetua.actors.motion.feet import FootTrack, foot_track
-from perpetua.actors.motion.footsteps import FootstepPlanner
+from perpetua.actors.motion.footsteps import FootstepPlanner, Plant
+from perpetua.actors.motion.gaze import aim_m, aim_share, dwell_gaze
+from perpetua.actors.motion.gesturing import Limbs, make_arm, make_fingers, wrist_from
+from perpetua.actors.motion.ground import Ground
 from perpetua.actors.motion.kinematics import bone, joint_index
 from perpetua.actors.motion.legs import SIDES, foot_of, leg_of, pelvis_heights_m, solve_leg
 from perpetua.actors.motion.path import RoutePath
-from perpetua.actors.motion.rotations import about_y, about_z, blend
+from perpetua.actors.motion.performance import Act, Score, draw_score
+from perpetua.actors.motion.rotations import about_y, about_z, blend, rotate
+from perpetua.actors.motion.sitting import (
+    Sitting,
+    lowered_pelvis,
+    pelvis_tilt_rad,
+    plan_sittings,
+    raised_heels,
+    seated_share,
+    sitting_lean_rad,
+    stepped_back,
+    without_failed_sits,
+)
 from perpetua.actors.motion.source import MOTION_SOURCES
 from perpetua.actors.motion.style import GaitStyle, draw_gait_style
-from perpetua.actors.motion.trunk import Trunk, make_trunk, spine_between
+from perpetua.actors.motion.trunk import Poise, Trunk, make_trunk, spine_between
 from perpetua.actors.types import BODY_JOINTS, BodyMotion, Route, Skeleton
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
@@ -28,8 +43,10 @@ from perpetua.seeding import StageSeed
 _FINE_HZ = 120.0
 # Filters over time see this much of what comes before the first and after the last frame.
 _FILTER_MARGIN_S = 0.8
-# Share of the leg by which the pelvis stands lower than with straight legs: at rest, and more when walking.
-_STANDING_DROP, _WALKING_DROP = 0.008, 0.008
+# From the thigh's bone up to a wrist that rests on it, and how far along the thigh.
+_WRIST_OVER_THIGH_M, _ALONG_THIGH = 0.105, 0.62
+
+Rotations = dict[str, Float64[np.ndarray, "N 3 3"]]
 
 
 @dataclass(frozen=True)
@@ -39,56 +56,72 @@ class _Walker:
     skeleton: Skeleton
     style: GaitStyle
     performance: Performance
+    route: Route
     path: RoutePath
+    sittings: tuple[Sitting, ...]
+    room: Room
 
 
 @dataclass(frozen=True)
 class _Clock:
     """Evenly spaced times around the frames, and where the frames are among them."""
 
+    fps: float
     time_s: Float64[np.ndarray, " N"]
     step_s: float
     at_frames: slice
 
 
+@dataclass(frozen=True)
+class _Stride:
+    """Both feet, left and right: where they stand when, and all that lies between."""
+
+    plants: tuple[tuple[Plant, ...], tuple[Plant, ...]]
+    tracks: tuple[FootTrack, FootTrack]
+
+
 @MOTION_SOURCES.register("procedural")
 class ProceduralMotion:
-    """Walks, strolls, turns and stands along any route, with arms posed by words."""
+    """Walks, jogs, turns, stands and sits along any route, with arms, trunk and head moved by words."""
 
     def make(
         self, route: Route, skeleton: Skeleton, room: Room, fps: float, config: MotionConfig, seed: StageSeed
     ) -> BodyMotion:
         """See ``MotionSource.make``."""
-        hip_m = bone(skeleton, "right_hip", "left_hip")
-        style = draw_gait_style(seed.stream("style", route.actor), 0.5 * float(hip_m[1]))
-        walker = _Walker(skeleton, style, perform(route.description), RoutePath(route, fps))
+        walker = _walker(route, skeleton, room, fps, seed)
         clock = _clock(len(route.heading_rad), fps)
-        feet = _feet(walker, seed.stream("steps", route.actor), clock)
-        trunk = _trunk(walker, feet, clock)
-        pelvis_m = np.column_stack([trunk.pelvis_xy_m, _pelvis_height_m(walker, trunk, feet, clock)])
+        stride = _stride(walker, seed.stream("steps", route.actor), clock)
+        score = _score(walker, seed.stream("actions", route.actor), clock)
+        trunk = _trunk(walker, stride, score, clock)
+        pelvis_m = _pelvis_m(walker, trunk, stride, score, clock)
         rotations = _trunk_rotations(trunk)
         reached = [
-            _enter_leg(rotations, side, walker, track, pelvis_m, trunk) for side, track in zip(SIDES, feet, strict=True)
+            _enter_leg(rotations, side, walker, track, pelvis_m, trunk)
+            for side, track in zip(SIDES, stride.tracks, strict=True)
         ]
-        for side, other in ((0, 1), (1, 0)):
-            _enter_arm(rotations, SIDES[side], walker, trunk, feet[side], feet[other], clock)
-        contacts = np.stack(
-            [
-                contact & reach
-                for track, reach in zip(feet, reached, strict=True)
-                for contact in (track.heel_contact, track.toe_contact)
-            ],
-            axis=1,
-        )
-        world_from_joint = np.stack([rotations[name] for name in BODY_JOINTS], axis=1)
+        acts = (_act_of(score, SIDES[0]), _act_of(score, SIDES[1]))
+        for side, act in zip(SIDES, acts, strict=True):
+            _enter_arm(rotations, side, walker, pelvis_m, stride, score, act, clock)
         at = clock.at_frames
+        world_from_joint = np.stack([rotations[name] for name in BODY_JOINTS], axis=1)
+        fingers = make_fingers(acts[0], acts[1], walker.path.run_share(clock.time_s))
         return BodyMotion(
             route.actor,
             fps,
             np.ascontiguousarray(world_from_joint[at]),
             np.ascontiguousarray(pelvis_m[at]),
-            np.ascontiguousarray(contacts[at]),
+            np.ascontiguousarray(_contacts(stride, reached)[at]),
+            np.ascontiguousarray(fingers[at]),
         )
+
+
+def _walker(route: Route, skeleton: Skeleton, room: Room, fps: float, seed: StageSeed) -> _Walker:
+    hip_m = bone(skeleton, "right_hip", "left_hip")
+    style = draw_gait_style(seed.stream("style", route.actor), 0.5 * float(hip_m[1]))
+    sittings = plan_sittings(route, skeleton, room, fps)
+    told = without_failed_sits(route, sittings, fps)
+    path = RoutePath(stepped_back(told, sittings, fps), fps)
+    return _Walker(skeleton, style, perform(route.description), told, path, sittings, room)
 
 
 def _clock(frames: int, fps: float) -> _Clock:
@@ -96,28 +129,56 @@ def _clock(frames: int, fps: float) -> _Clock:
     margin = int(np.ceil(_FILTER_MARGIN_S * fps)) * fine
     count = (frames - 1) * fine + 1
     time_s = (np.arange(count + 2 * margin) - margin) / (fps * fine)
-    return _Clock(time_s, 1.0 / (fps * fine), slice(margin, margin + count, fine))
+    return _Clock(fps, time_s, 1.0 / (fps * fine), slice(margin, margin + count, fine))
 
 
-def _feet(walker: _Walker, rng: np.random.Generator, clock: _Clock) -> tuple[FootTrack, FootTrack]:
+def _stride(walker: _Walker, rng: np.random.Generator, clock: _Clock) -> _Stride:
     left, right = (foot_of(walker.skeleton, side) for side in SIDES)
     leg = leg_of(walker.skeleton, "left")
     hip_height_m = float(left.ankle_height_m - (leg.thigh_m + leg.shin_m)[2])
     ankle_ahead_m = float(bone(walker.skeleton, "pelvis", "left_ankle")[0])
-    planner = FootstepPlanner(walker.path, walker.style, hip_height_m, ankle_ahead_m, rng)
+    ground = Ground(walker.room)
+    planner = FootstepPlanner(walker.path, walker.style, hip_height_m, ankle_ahead_m, ground, rng)
     plants = planner.plan()
-    clearance_m = walker.style.clearance_m
-    return (
-        foot_track(plants[0], left, clearance_m, clock.time_s),
-        foot_track(plants[1], right, clearance_m, clock.time_s),
+    tracks = [
+        raised_heels(
+            foot_track(steps, foot, walker.style.clearance_m, ground, clock.time_s),
+            walker.sittings,
+            foot.toe_joint_m,
+            clock.time_s,
+        )
+        for steps, foot in zip(plants, (left, right), strict=True)
+    ]
+    return _Stride(plants, (tracks[0], tracks[1]))
+
+
+def _score(walker: _Walker, rng: np.random.Generator, clock: _Clock) -> Score:
+    return draw_score(
+        walker.performance,
+        walker.path.stillness(clock.time_s),
+        seated_share(walker.sittings, clock.time_s),
+        clock.time_s,
+        rng,
     )
 
 
-def _trunk(walker: _Walker, feet: tuple[FootTrack, FootTrack], clock: _Clock) -> Trunk:
-    lead_m = _lead_m(walker, feet[0], feet[1], clock)
-    return make_trunk(
-        walker.path, walker.style, walker.performance, feet[0].on_floor, feet[1].on_floor, lead_m, clock.time_s
+def _trunk(walker: _Walker, stride: _Stride, score: Score, clock: _Clock) -> Trunk:
+    time_s = clock.time_s
+    eye_m = _eye_m(walker, clock)
+    poise = Poise(
+        score,
+        dwell_gaze(walker.route, clock.fps, eye_m, walker.path.heading_rad(time_s), time_s),
+        seated_share(walker.sittings, time_s),
+        sitting_lean_rad(walker.sittings, time_s),
+        pelvis_tilt_rad(walker.sittings, time_s),
     )
+    lead_m = _lead_m(walker, stride.tracks[0], stride.tracks[1], clock)
+    return make_trunk(walker.path, walker.style, poise, stride.tracks, lead_m, time_s)
+
+
+def _eye_m(walker: _Walker, clock: _Clock) -> Float64[np.ndarray, "N 3"]:
+    head_m = float(walker.skeleton.joint_m[joint_index("head"), 2] - walker.skeleton.contact_m[:, 2].min())
+    return walker.path.position_m(clock.time_s) + np.array([0.0, 0.0, head_m + 0.06])
 
 
 def _lead_m(walker: _Walker, foot: FootTrack, other: FootTrack, clock: _Clock) -> Float64[np.ndarray, " N"]:
@@ -127,20 +188,23 @@ def _lead_m(walker: _Walker, foot: FootTrack, other: FootTrack, clock: _Clock) -
     return np.asarray(apart_m[:, 0] * np.cos(heading_rad) + apart_m[:, 1] * np.sin(heading_rad))
 
 
-def _pelvis_height_m(
-    walker: _Walker, trunk: Trunk, feet: tuple[FootTrack, FootTrack], clock: _Clock
-) -> Float64[np.ndarray, " N"]:
+def _pelvis_m(
+    walker: _Walker, trunk: Trunk, stride: _Stride, score: Score, clock: _Clock
+) -> Float64[np.ndarray, "N 3"]:
     legs = (leg_of(walker.skeleton, "left"), leg_of(walker.skeleton, "right"))
-    sole_m = float(walker.skeleton.contact_m[:, 2].min())
-    floor_m = gaussian_filter1d(walker.path.position_m(clock.time_s)[:, 2], 0.15 / clock.step_s)
-    pace = np.clip(walker.path.speed_mps(clock.time_s) / 1.0, 0.0, 1.0)
-    drop_m = (_STANDING_DROP + _WALKING_DROP * pace) * legs[0].reach_m
-    nominal_m = floor_m + walker.skeleton.joint_m[joint_index("pelvis"), 2] - sole_m - drop_m
-    ankles_m = (feet[0].ankle_m, feet[1].ankle_m)
-    return pelvis_heights_m(nominal_m, trunk.pelvis_xy_m, trunk.world_from_pelvis, legs, ankles_m, clock.step_s)
+    ankles_m = (stride.tracks[0].ankle_m, stride.tracks[1].ankle_m)
+    standing_m = nominal_height_m(
+        walker.path, walker.skeleton, stride.plants, legs[0].reach_m, score.drop, clock.time_s
+    )
+    pelvis_m = np.column_stack([trunk.pelvis_xy_m, standing_m])
+    pelvis_m = lowered_pelvis(walker.sittings, pelvis_m, trunk.world_from_pelvis, walker.skeleton, clock.time_s)
+    pelvis_m[:, 2] = pelvis_heights_m(
+        pelvis_m[:, 2], pelvis_m[:, :2], trunk.world_from_pelvis, legs, ankles_m, clock.step_s
+    )
+    return pelvis_m
 
 
-def _trunk_rotations(trunk: Trunk) -> dict[str, Float64[np.ndarray, "N 3 3"]]:
+def _trunk_rotations(trunk: Trunk) -> Rotations:
     lower, middle = spine_between(trunk.world_from_pelvis, trunk.world_from_chest)
     return {
         "pelvis": trunk.world_from_pelvis,
@@ -153,13 +217,13 @@ def _trunk_rotations(trunk: Trunk) -> dict[str, Float64[np.ndarray, "N 3 3"]]:
 
 
 def _enter_leg(
-    rotations: dict[str, Float64[np.ndarray, "N 3 3"]],
+    rotations: Rotations,
     side: str,
     walker: _Walker,
     track: FootTrack,
     pelvis_m: Float64[np.ndarray, "N 3"],
     trunk: Trunk,
-) -> np.ndarray:
+) -> Bool[np.ndarray, " N"]:
     """Adds a leg's rotations; returns where its ankle is exactly on its track."""
     leg = leg_of(walker.skeleton, side)
     bones = solve_leg(leg, track, pelvis_m, trunk.world_from_pelvis, trunk.heading_rad)
@@ -170,31 +234,77 @@ def _enter_leg(
     return np.asarray(np.linalg.norm(bones.end_m - track.ankle_m, axis=1) < 1e-6)
 
 
+def _act_of(score: Score, side: str) -> Act | None:
+    """The act that has an arm."""
+    return next((act for act in score.acts if getattr(act.action, side) is not None), None)
+
+
 def _enter_arm(
-    rotations: dict[str, Float64[np.ndarray, "N 3 3"]],
+    rotations: Rotations,
     side: str,
     walker: _Walker,
-    trunk: Trunk,
-    foot: FootTrack,
-    other: FootTrack,
+    pelvis_m: Float64[np.ndarray, "N 3"],
+    stride: _Stride,
+    score: Score,
+    act: Act | None,
     clock: _Clock,
 ) -> None:
     """Adds an arm's rotations."""
-    style, performance = walker.style, walker.performance
-    reach = performance.left if side == "left" else performance.right
-    lead_m = gaussian_filter1d(_lead_m(walker, other, foot, clock), 0.06 / clock.step_s)
-    if reach is None:
-        forward_rad = performance.arm_swing * style.arm_swing_rad_per_m * lead_m + 0.05
-        arm = hanging_arm(side, trunk.world_from_chest, forward_rad, style.arm_abduction_rad, style.elbow_rad)
-    else:
-        # A held hand still bobs a little with the steps.
-        sway = np.stack([0.02 * lead_m, np.zeros_like(lead_m), 0.01 * lead_m**2], axis=1)
-        arm = reaching_arm(side, walker.skeleton, trunk.world_from_chest, reach, sway, clock.time_s)
-    _enter(rotations, side, arm)
+    limbs = _limbs(rotations, side, walker, pelvis_m, stride, clock)
+    arm = make_arm(side, walker.skeleton, walker.style, walker.performance.arm_swing, limbs, act, score.shrug_rad)
+    rotations[f"{side}_collar"] = rotations["spine3"] @ arm.collar
+    rotations[f"{side}_shoulder"] = rotations[f"{side}_collar"] @ arm.shoulder
+    rotations[f"{side}_elbow"] = rotations[f"{side}_shoulder"] @ arm.elbow
+    rotations[f"{side}_wrist"] = rotations[f"{side}_elbow"] @ arm.wrist
 
 
-def _enter(rotations: dict[str, Float64[np.ndarray, "N 3 3"]], side: str, arm: ArmRotations) -> None:
-    rotations[f"{side}_collar"] = arm.collar
-    rotations[f"{side}_shoulder"] = arm.shoulder
-    rotations[f"{side}_elbow"] = arm.elbow
-    rotations[f"{side}_wrist"] = arm.wrist
+def _limbs(
+    rotations: Rotations,
+    side: str,
+    walker: _Walker,
+    pelvis_m: Float64[np.ndarray, "N 3"],
+    stride: _Stride,
+    clock: _Clock,
+) -> Limbs:
+    skeleton, time_s = walker.skeleton, clock.time_s
+    here = SIDES.index(side)
+    lead_m = _lead_m(walker, stride.tracks[1 - here], stride.tracks[here], clock)
+    shoulder_m = _shoulder_m(rotations, side, skeleton, pelvis_m)
+    hip_m = pelvis_m + rotate(rotations["pelvis"], bone(skeleton, "pelvis", f"{side}_hip"))
+    thigh_m = hip_m + _ALONG_THIGH * rotate(rotations[f"{side}_hip"], bone(skeleton, f"{side}_hip", f"{side}_knee"))
+    thigh_m[:, 2] += _WRIST_OVER_THIGH_M
+    target_m = aim_m(walker.route, walker.room, clock.fps, time_s)
+    known = np.isfinite(target_m).all(axis=1)
+    eye_m, heading_rad = _eye_m(walker, clock), walker.path.heading_rad(time_s)
+    ahead_m = eye_m + 3.0 * np.stack([np.cos(heading_rad), np.sin(heading_rad), np.zeros_like(heading_rad)], axis=1)
+    target_m = np.where(known[:, None], target_m, ahead_m)
+    chest = rotations["spine3"]
+    aim = wrist_from(side, skeleton, target_m, shoulder_m, chest)
+    return Limbs(
+        gaussian_filter1d(lead_m, 0.06 / clock.step_s),
+        walker.path.run_share(time_s),
+        seated_share(walker.sittings, time_s),
+        wrist_from(side, skeleton, thigh_m, shoulder_m, chest),
+        0.95 * aim / np.maximum(np.linalg.norm(aim, axis=1, keepdims=True), 1e-6),
+        aim_share(target_m, eye_m, heading_rad),
+    )
+
+
+def _shoulder_m(
+    rotations: Rotations, side: str, skeleton: Skeleton, pelvis_m: Float64[np.ndarray, "N 3"]
+) -> Float64[np.ndarray, "N 3"]:
+    place_m = pelvis_m
+    for start, end in (("pelvis", "spine1"), ("spine1", "spine2"), ("spine2", "spine3")):
+        place_m = place_m + rotate(rotations[start], bone(skeleton, start, end))
+    return np.asarray(place_m + rotate(rotations["spine3"], bone(skeleton, "spine3", f"{side}_shoulder")))
+
+
+def _contacts(stride: _Stride, reached: list[Bool[np.ndarray, " N"]]) -> Bool[np.ndarray, "N 4"]:
+    return np.stack(
+        [
+            contact & reach
+            for track, reach in zip(stride.tracks, reached, strict=True)
+            for contact in (track.heel_contact, track.toe_contact)
+        ],
+        axis=1,
+    )
