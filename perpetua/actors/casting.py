@@ -1,25 +1,78 @@
-"""Who does what: an action description in plain words for each actor."""
+"""Who does what: an action description in plain words for each actor, and the paces it goes at."""
 
+import logging
+from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
-from perpetua.actors.config import MotionConfig
+from perpetua.actors.config import MotionConfig, PaceShares
+from perpetua.actors.motion.actions import stated_paces, wants_seat
+from perpetua.actors.types import PACES
 from perpetua.errors import ConfigError
 from perpetua.seeding import StageSeed
+
+logger = logging.getLogger(__name__)
 
 ACTION_FOLDER = Path(__file__).parents[2] / "configs" / "actions"
 
 
-def draw_descriptions(count: int, config: MotionConfig, seed: StageSeed) -> tuple[str, ...]:
-    """An action description for each actor, no two alike while the list lasts.
+@dataclass(frozen=True)
+class Role:
+    """What an actor does, in plain words; ``paces`` it may go at, of ``PACES``; whether it sits down."""
+
+    description: str
+    paces: tuple[str, ...]
+    sits: bool
+
+
+def cast_actors(count: int, config: MotionConfig, shares: PaceShares, seats: int, seed: StageSeed) -> tuple[Role, ...]:
+    """A role for each actor, no two alike while the list lasts.
+
+    Each actor draws a pace by its share, then the next description of a shuffled list that states this pace, or none;
+    where none is left, words win over shares. Descriptions given in ``config.descriptions`` are all used in turn.
+
+    Args:
+        count: number of actors.
+        config: where descriptions come from.
+        shares: how often each pace is drawn.
+        seats: how many actors can sit down in the room; no more get descriptions that ask for a seat.
+        seed: all randomness comes from ``seed.stream("actions")`` and ``seed.stream("pace", actor)``.
 
     Raises:
         ConfigError: ``actors.motion.actions`` names no list of descriptions.
     """
     descriptions = action_descriptions(config)
     order = seed.stream("actions").permutation(len(descriptions))
-    return tuple(descriptions[order[actor % len(order)]] for actor in range(count))
+    waiting: list[str] = []
+    roles: list[Role] = []
+    for actor in range(count):
+        waiting = waiting or [descriptions[index] for index in order]
+        pace = _draw_pace(shares, seed, actor)
+        free_seats = seats - sum(role.sits for role in roles)
+        description = waiting[0] if config.descriptions else _choose(waiting, pace, free_seats)
+        waiting.remove(description)
+        stated = stated_paces(description)
+        if wants_seat(description) and free_seats <= 0:
+            logger.warning("no seat is left for '%s' in this room, so actor %d stays on its feet", description, actor)
+        paces = tuple(name for name in PACES if name in stated) or (pace,)
+        roles.append(Role(description, paces, wants_seat(description) and free_seats > 0))
+    return tuple(roles)
+
+
+def _draw_pace(shares: PaceShares, seed: StageSeed, actor: int) -> str:
+    weights = [getattr(shares, pace) for pace in PACES]
+    drawn = seed.stream("pace", actor).choice(len(PACES), p=[weight / sum(weights) for weight in weights])
+    return PACES[int(drawn)]
+
+
+def _choose(waiting: list[str], pace: str, free_seats: int) -> str:
+    """The first description that suits; nobody jogs or stands about at what could be said of a walker."""
+    possible = [words for words in waiting if free_seats > 0 or not wants_seat(words)] or waiting
+    stating = [words for words in possible if pace in stated_paces(words)]
+    silent = [words for words in possible if not stated_paces(words)]
+    suitable = (stating or silent) if pace in ("stand", "jog") else stating + silent
+    return min(suitable or possible, key=waiting.index)
 
 
 def action_descriptions(config: MotionConfig) -> tuple[str, ...]:

@@ -27,6 +27,8 @@ def build_nav_grid(room: Room, config: NavigationConfig) -> NavGrid:
     higher than ``config.step_m``. ``clearance_m`` comes from an exact Euclidean distance transform on a finer grid,
     less the largest rounding of that grid, so it never exceeds the true distance.
 
+    Connected regions smaller than ``config.min_region_m2`` are left out; the largest one is kept in any case.
+
     Raises:
         NavigationError: no cell is free.
     """
@@ -37,7 +39,7 @@ def build_nav_grid(room: Room, config: NavigationConfig) -> NavGrid:
     half_diagonal_m = fine.cell_m * math.sqrt(0.5)
     fine_clearance_m = ndimage.distance_transform_edt(~obstacle) * fine.cell_m - half_diagonal_m
     clearance_m = np.maximum(_at_centres(fine_clearance_m, fine_per_cell), 0.0).astype(np.float32)
-    free = _largest_region(clearance_m >= config.body_radius_m)
+    free = large_regions(clearance_m >= config.body_radius_m, config.min_region_m2 / config.cell_m**2)
     if not free.any():
         raise NavigationError(
             f"a person needs {config.body_radius_m:.2f} m of free floor around the body, but the widest place of "
@@ -116,8 +118,12 @@ def _too_high_steps(floor_z_m: Float32[np.ndarray, "X Y"], step_m: float) -> Boo
     return np.asarray(highest_m > lowest_m + step_m)
 
 
-def _largest_region(free: Bool[np.ndarray, "X Y"]) -> Bool[np.ndarray, "X Y"]:
+def large_regions(free: Bool[np.ndarray, "X Y"], min_cells: float) -> Bool[np.ndarray, "X Y"]:
+    """The connected regions of at least so many cells, and the largest in any case."""
     labels, count = ndimage.label(free)
     if count == 0:
         return free
-    return np.asarray(labels == 1 + np.bincount(labels.ravel())[1:].argmax())
+    cells = np.bincount(labels.ravel())
+    cells[0] = 0
+    kept = cells >= min(float(cells.max()), max(min_cells, 1.0))
+    return np.asarray(kept[labels])

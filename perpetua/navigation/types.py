@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64
+from scipy import ndimage
 
 
 @dataclass(frozen=True)
@@ -11,9 +12,9 @@ class NavGrid:
     """A 2.5D grid of where a person can stand.
 
     Cell (i, j) has its centre at ``origin_m + cell_m * (i, j)`` (x, y). ``floor_z_m`` is the height stood on;
-    ``free`` is true where the body's axis may be (obstacles already grown by the body radius; one connected
-    region); ``clearance_m`` is the distance from the cell's centre to the nearest obstacle, 0 on obstacles,
-    before growing.
+    ``free`` is true where the body's axis may be (obstacles already grown by the body radius; one or more
+    connected regions); ``clearance_m`` is the distance from the cell's centre to the nearest obstacle, 0 on
+    obstacles, before growing.
     """
 
     origin_m: Float64[np.ndarray, "2"]
@@ -24,5 +25,21 @@ class NavGrid:
 
     @property
     def free_floor_m2(self) -> float:
-        """Area of the free region in square metres."""
-        return float(self.free.sum()) * self.cell_m**2
+        """Area of the largest connected free region in square metres."""
+        labels, count = ndimage.label(self.free)
+        return float(np.bincount(labels.ravel())[1:].max()) * self.cell_m**2 if count else 0.0
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A place worth a pause: where one stands, which way one faces, and what for.
+
+    ``purpose`` is "look" (at ``target_m``), "stand" (at a worktop, ``target_m`` on it) or "sit" (with the back to
+    the seat, ``target_m`` its middle). ``object_index`` is what it is about.
+    """
+
+    place_m: tuple[float, float]
+    facing_rad: float
+    purpose: str
+    object_index: int
+    target_m: tuple[float, float, float]

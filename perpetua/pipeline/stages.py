@@ -287,11 +287,11 @@ STAGES = (
         scripts=("infinigen_room.py",),
         redraw=_when_routes_are_spent,
     ),
-    Stage(20, "navigation", 1, ("room",), _settings("navigation"), _navigation),
+    Stage(20, "navigation", 2, ("room",), _settings("navigation"), _navigation),
     Stage(
         30,
         "routes",
-        1,
+        2,
         ("room", "navigation"),
         _route_settings,
         _routes,

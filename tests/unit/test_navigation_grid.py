@@ -73,18 +73,43 @@ def test_rug_is_stood_on() -> None:
     assert grid.free[cell_at(grid, 0.5, 0.0)]
 
 
-def test_high_platform_cannot_be_stepped_on() -> None:
-    platform = box((2.0, 3.0, 0.25), (0.0, -1.5, 0.0))
-    grid = build_nav_grid(room_with(rug=platform), CONFIG)
+def test_high_platform_is_not_stepped_on_and_low_one_is() -> None:
+    def free_across_the_edge(height_m: float) -> bool:
+        grid = build_nav_grid(room_with(rug=box((2.0, 3.0, height_m), (0.0, -1.5, 0.0))), CONFIG)
+        assert grid.floor_z_m[cell_at(grid, 1.0, 0.0)] == pytest.approx(height_m)
+        return bool(grid.free[cell_at(grid, 0.0, 0.0)])
+
+    assert free_across_the_edge(CONFIG.step_m - 0.01)
+    assert not free_across_the_edge(CONFIG.step_m + 0.01)
+    assert not free_across_the_edge(0.25)
+
+
+def test_table_top_is_no_floor() -> None:
+    table = box((1.4, 1.0, 0.03), (-0.7, -0.5, 0.4))
+    grid = build_nav_grid(room_with(table), CONFIG)
     assert not grid.free[cell_at(grid, 0.0, 0.0)]
-    assert grid.free[cell_at(grid, 1.0, 0.0)] != grid.free[cell_at(grid, -1.0, 0.0)]
+    assert grid.floor_z_m.max() == 0.0
 
 
-def test_only_the_largest_connected_region_is_free() -> None:
-    grid = build_nav_grid(room_with(box((0.02, 3.0, 2.0), (0.8, -1.5, 0.0))), CONFIG)
-    assert grid.free[cell_at(grid, -1.0, 0.0)]
-    assert not grid.free[cell_at(grid, 1.4, 0.0)]
-    assert grid.free_floor_m2 == pytest.approx((2.8 - 0.56) * (3.0 - 0.56), abs=0.25)
+def test_free_floor_keeps_the_body_radius_and_no_more() -> None:
+    pillar = box((0.4, 0.4, 2.0), (-0.2, -0.2, 0.0))
+    for radius_m in (0.2, 0.35):
+        grid = build_nav_grid(room_with(pillar), NavigationConfig(body_radius_m=radius_m))
+        x, y = centres(grid)[grid.free].T
+        to_pillar_m = np.hypot(np.maximum(np.abs(x) - 0.2, 0.0), np.maximum(np.abs(y) - 0.2, 0.0))
+        to_wall_m = np.minimum(2.0 - np.abs(x), 1.5 - np.abs(y))
+        assert radius_m <= to_pillar_m.min() < radius_m + 0.07
+        assert radius_m <= to_wall_m.min() < radius_m + 0.07
+
+
+def test_regions_large_enough_are_kept_and_the_largest_always() -> None:
+    wall = box((0.02, 3.0, 2.0), (0.6, -1.5, 0.0))
+    larger_m2, smaller_m2 = (2.6 - 0.56) * (3.0 - 0.56), (1.38 - 0.56) * (3.0 - 0.56)
+    for min_region_m2, kept in ((0.0, True), (smaller_m2 - 0.3, True), (smaller_m2 + 0.3, False), (90.0, False)):
+        grid = build_nav_grid(room_with(wall), NavigationConfig(min_region_m2=min_region_m2))
+        assert grid.free[cell_at(grid, -1.0, 0.0)]
+        assert grid.free[cell_at(grid, 1.3, 0.0)] == kept
+        assert grid.free_floor_m2 == pytest.approx(larger_m2, abs=0.25)
 
 
 def test_hole_in_the_floor_is_no_floor() -> None:

@@ -12,11 +12,17 @@ from torch import Tensor
 from perpetua.actors.routes import losses
 
 STEP_S = 0.1
+PAUSING = torch.zeros(3, 12, dtype=torch.float64)
+PAUSING[1:, 4:9] = 1.0
 
 
 def straight(speed_mps: float, steps: int = 30) -> Tensor:
     x = torch.arange(steps, dtype=torch.float64) * STEP_S * speed_mps
     return torch.stack([x, torch.zeros_like(x)], dim=-1)[None]
+
+
+def limit(speed_mps: float) -> Tensor:
+    return torch.tensor([speed_mps], dtype=torch.float64)
 
 
 def wiggly(actors: int = 3, steps: int = 12) -> tuple[Tensor, Tensor]:
@@ -30,7 +36,7 @@ def wiggly(actors: int = 3, steps: int = 12) -> tuple[Tensor, Tensor]:
     [
         ("clearance", lambda p, h: losses.clearance_loss(p[..., 0], 0.3)),
         ("separation", lambda p, h: losses.separation_loss(p, 0.9)),
-        ("speed", lambda p, h: losses.speed_loss(p, STEP_S, 1.0)),
+        ("speed", lambda p, h: losses.speed_loss(p, STEP_S, torch.tensor([0.5, 1.0, 2.0], dtype=torch.float64))),
         ("acceleration", lambda p, h: losses.acceleration_loss(p, STEP_S, 3.0)),
         ("jerk", lambda p, h: losses.jerk_loss(p, STEP_S)),
         ("heading", lambda p, h: losses.heading_loss(p, h, STEP_S)),
@@ -38,6 +44,7 @@ def wiggly(actors: int = 3, steps: int = 12) -> tuple[Tensor, Tensor]:
         ("turn change", lambda p, h: losses.turn_change_loss(h, STEP_S)),
         ("variation", lambda p, h: losses.variation_loss(p, 1.0)),
         ("walk", lambda p, h: losses.walk_loss(p, torch.zeros_like(p))),
+        ("pause", lambda p, h: losses.pause_loss(p, h, torch.zeros_like(p), torch.ones_like(h), PAUSING)),
     ],
 )
 def test_gradient_agrees_with_finite_differences(name: str, loss: Callable[[Tensor, Tensor], Tensor]) -> None:
@@ -90,7 +97,7 @@ def test_separation_counts_each_pair_once() -> None:
 def test_steady_walk_costs_nothing() -> None:
     path_m = straight(1.0)
     ahead = torch.zeros(1, 30, dtype=torch.float64)
-    assert float(losses.speed_loss(path_m, STEP_S, 1.01)) == 0.0
+    assert float(losses.speed_loss(path_m, STEP_S, limit(1.01))) == 0.0
     assert float(losses.acceleration_loss(path_m, STEP_S, 0.01)) == 0.0
     assert float(losses.jerk_loss(path_m, STEP_S)) == pytest.approx(0.0, abs=1e-15)
     assert float(losses.heading_loss(path_m, ahead, STEP_S)) == pytest.approx(0.0, abs=1e-6)
@@ -98,7 +105,7 @@ def test_steady_walk_costs_nothing() -> None:
 
 
 def test_speed_and_jerk_have_the_values_of_known_motion() -> None:
-    assert float(losses.speed_loss(straight(1.7), STEP_S, 1.2)) == pytest.approx(0.25, rel=1e-6)
+    assert float(losses.speed_loss(straight(1.7), STEP_S, limit(1.2))) == pytest.approx(0.25, rel=1e-6)
     t = torch.arange(30, dtype=torch.float64) * STEP_S
     cubic = torch.stack([t**3, torch.zeros_like(t)], dim=-1)[None]
     assert float(losses.jerk_loss(cubic, STEP_S)) == pytest.approx(36.0, rel=1e-6)
@@ -125,3 +132,20 @@ def test_variation_prefers_new_floor() -> None:
     back = torch.cat([there[:, :30], there[:, :30].flip(1)], dim=1)
     assert float(losses.variation_loss(back, STEP_S)) > 5 * float(losses.variation_loss(there, STEP_S))
     assert float(losses.variation_loss(straight(0.0, 10), STEP_S)) == 0.0
+
+
+def test_speed_is_limited_for_each_actor_alone() -> None:
+    both = torch.cat([straight(1.5), straight(2.5)])
+    limits = torch.tensor([1.0, 3.0], dtype=torch.float64)
+    assert float(losses.speed_loss(both, STEP_S, limits)) == pytest.approx(0.5 * 0.25, rel=1e-6)
+
+
+def test_a_pause_costs_its_distance_and_its_turn_and_nothing_else_does() -> None:
+    walk_m, facing_rad = straight(0.0, 10), torch.zeros(1, 10, dtype=torch.float64)
+    pausing = torch.zeros(1, 10, dtype=torch.float64)
+    pausing[0, 5:] = 1.0
+    moved_m = walk_m + torch.tensor([0.3, 0.4], dtype=torch.float64)
+    assert float(losses.pause_loss(moved_m, facing_rad, walk_m, facing_rad, pausing)) == pytest.approx(0.125)
+    turned_rad = facing_rad + 2 * math.pi + 0.1
+    assert float(losses.pause_loss(walk_m, turned_rad, walk_m, facing_rad, pausing)) == pytest.approx(0.005, rel=1e-2)
+    assert float(losses.pause_loss(moved_m, turned_rad, walk_m, facing_rad, 0.0 * pausing)) == 0.0

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from scipy.interpolate import CubicSpline
 
-from perpetua.actors.config import ActorsConfig, RoutesConfig
+from perpetua.actors.config import ActorsConfig, MotionConfig, RoutesConfig
 from perpetua.actors.routes import plan_routes
 from perpetua.actors.routes.checks import TimedPaths, find_violations
 from perpetua.actors.types import Route
@@ -21,6 +21,8 @@ SEED = StageSeed(7, 0, "routes")
 RADIUS_M = NavigationConfig().body_radius_m
 TABLE_M = np.array([[-0.6, -0.4], [0.6, 0.4]])
 SIDE_M = (5.0, 4.5)
+BENCH_INDEX = 4
+BENCH_M = np.array([[-1.0, -2.25, 0.0], [0.5, -1.8, 0.45]])
 
 
 def box_object(index: int, name: str, low_m: list[float], high_m: list[float], walkable: bool) -> SceneObject:
@@ -37,6 +39,8 @@ def room_with_table() -> Room:
         box_object(1, "floor", [-x, -y, -0.1], [x, y, 0.0], True),
         box_object(2, "table_01", [*TABLE_M[0], 0.7], [*TABLE_M[1], 0.75], False),
         box_object(3, "rug_01", [-x, 1.0, 0.0], [x, y, 0.01], True),
+        box_object(BENCH_INDEX, "bench", list(BENCH_M[0]), list(BENCH_M[1]), False),
+        box_object(5, "picture", [x - 0.03, -1.0, 1.2], [x, -0.4, 1.8], False),
     )
     return Room("test", "diningroom", np.array([[-x, -y], [x, -y], [x, y], [-x, y]]), 2.6, objects, (), None)
 
@@ -46,9 +50,10 @@ GRID: NavGrid = build_nav_grid(ROOM, NavigationConfig())
 
 
 def exact_clearance_m(place_m: np.ndarray) -> np.ndarray:
-    outside = np.maximum(np.maximum(TABLE_M[0] - place_m, place_m - TABLE_M[1]), 0.0)
+    boxes_m = (TABLE_M, BENCH_M[:, :2])
+    outside = [np.maximum(np.maximum(box_m[0] - place_m, place_m - box_m[1]), 0.0) for box_m in boxes_m]
     to_wall = (np.array(SIDE_M) / 2 - np.abs(place_m)).min(-1)
-    return np.minimum(np.linalg.norm(outside, axis=-1), to_wall)
+    return np.minimum.reduce([*(np.linalg.norm(away, axis=-1) for away in outside), to_wall])
 
 
 def finely(values: np.ndarray) -> np.ndarray:
@@ -75,20 +80,53 @@ def test_hard_limits_hold_by_exact_distances(routes: tuple[Route, ...]) -> None:
         assert speed_mps.max() <= config.max_speed_mps + 1e-3
         for other_m in fine[:index]:
             assert np.linalg.norm(place_m - other_m, axis=1).min() >= config.separation_m - 1e-3
-    for route in routes:
-        acceleration = np.linalg.norm(np.diff(route.position_m[:, :2], n=2, axis=0), axis=1) * 144.0
-        assert acceleration.max() <= config.max_acceleration_mps2
+    for route, place_m in zip(routes, fine, strict=True):
+        acceleration = np.linalg.norm(np.diff(place_m, n=2, axis=0), axis=1) * 48.0**2
+        assert acceleration.max() <= 1.02 * config.max_acceleration_mps2
         assert np.abs(np.diff(route.heading_rad)).max() * 12.0 <= config.max_turn_rate_radps
 
 
-def test_everybody_walks_most_of_the_time_and_ahead(routes: tuple[Route, ...]) -> None:
+def test_who_walks_walks_ahead_and_who_pauses_stands_still(routes: tuple[Route, ...]) -> None:
     for route in routes:
         velocity = np.diff(route.position_m[:, :2], axis=0) * 12.0
         speed_mps = np.linalg.norm(velocity, axis=1)
-        assert (speed_mps > 0.3).mean() > 0.6
         middle_rad = 0.5 * (route.heading_rad[1:] + route.heading_rad[:-1])
         ahead = (velocity * np.stack([np.cos(middle_rad), np.sin(middle_rad)], axis=1)).sum(1)
         assert (ahead[speed_mps > 0.4] > 0.7 * speed_mps[speed_mps > 0.4]).all()
+        for dwell in route.dwells:
+            assert speed_mps[dwell.first_frame : dwell.last_frame].max() < 1e-6
+
+
+def test_words_set_the_pace_and_ask_for_a_seat() -> None:
+    motion = MotionConfig(descriptions=("strolls, relaxed", "walks to the bench and sits down"))
+    config = ActorsConfig(count=2, routes=RoutesConfig(steps=150), motion=motion)
+    routes = {route.description: route for route in plan_routes(ROOM, GRID, config, 160, 20.0, SEED)}
+    strolls, sits = (routes[description] for description in motion.descriptions)
+    for route, limit_mps in ((strolls, 1.3), (sits, 2.0)):
+        assert np.linalg.norm(np.diff(route.position_m[:, :2], axis=0), axis=1).max() * 20.0 < limit_mps
+    (sitting,) = [dwell for dwell in sits.dwells if dwell.purpose == "sit"]
+    assert sitting.object_index == BENCH_INDEX
+    assert (sitting.last_frame - sitting.first_frame) / 20.0 > 3.0
+    there = slice(sitting.first_frame, sitting.last_frame + 1)
+    away_m = np.linalg.norm(sits.position_m[there, :2] - np.array(sitting.target_m[:2]), axis=1)
+    assert away_m.max() < 0.75
+    back = np.array(sitting.target_m[:2]) - sits.position_m[sitting.first_frame, :2]
+    assert (np.cos(sits.heading_rad[there] - np.arctan2(-back[1], -back[0])) > 0.9).all()
+    assert np.linalg.norm(np.diff(sits.position_m[there], axis=0), axis=1).max() * 20.0 < 1e-6
+
+
+def test_pauses_look_at_what_they_are_about() -> None:
+    config = ActorsConfig(count=2, routes=RoutesConfig(steps=100, pause_share=0.6))
+    routes = plan_routes(ROOM, GRID, config, 240, 20.0, SEED)
+    dwells = [(route, dwell) for route in routes for dwell in route.dwells]
+    assert dwells
+    for route, dwell in dwells:
+        thing = next(thing for thing in ROOM.objects if thing.object_index == dwell.object_index)
+        low_m, high_m = thing.mesh.vertices_m.min(0), thing.mesh.vertices_m.max(0)
+        assert ((dwell.target_m > low_m - 1e-6) & (dwell.target_m < high_m + 1e-6)).all()
+        towards = np.array(dwell.target_m[:2]) - route.position_m[dwell.first_frame, :2]
+        off_rad = route.heading_rad[dwell.first_frame] - np.arctan2(towards[1], towards[0])
+        assert np.cos(off_rad) > 0.9
 
 
 def test_routes_stand_on_the_rug_and_on_the_floor() -> None:
@@ -126,11 +164,12 @@ def test_too_many_actors_get_a_clear_error() -> None:
 
 
 def test_clearance_error_names_the_furniture() -> None:
-    tight = NavGrid(GRID.origin_m, GRID.cell_m, GRID.floor_z_m, GRID.free, GRID.clearance_m - np.float32(0.0))
-    free = tight.free & (tight.clearance_m > 0.9)
+    free = GRID.free & (GRID.clearance_m > 0.9)
     unreachable = NavGrid(GRID.origin_m, GRID.cell_m, GRID.floor_z_m, free, GRID.clearance_m)
     config = ActorsConfig(count=1, routes=RoutesConfig(steps=10, max_redraws=0))
-    with pytest.raises(RouteError, match=r"comes within 0\.\d\d m of 'table_01' at frame \d+; at least 0\.9\d m"):
+    with pytest.raises(
+        RouteError, match=r"comes within 0\.\d\d m of '(table_01|picture|bench)' at frame \d+; at least 0\.9\d m"
+    ):
         plan_routes(ROOM, unreachable, config, 60, 12.0, SEED)
 
 
@@ -146,8 +185,8 @@ def test_checks_find_each_kind_of_breach() -> None:
     assert violation_rules(calm, ahead) == set()
     assert violation_rules(calm, ahead + np.pi) == {"sidestep"}
     assert violation_rules(calm * np.array([1.0, 0.0]), ahead) == {"clearance", "separation"}
-    assert "speed" in violation_rules(calm * np.array([2.2, 1.0]) + np.array([2.1, 0.0]), ahead)
+    assert violation_rules(calm[:, ::4], ahead[:, ::4]) == {"speed"}
     jerky = calm.copy()
     jerky[0, 10, 0] += 0.08
     assert "acceleration" in violation_rules(jerky, ahead)
-    assert "turn rate" in violation_rules(calm, ahead + np.array([[0.0], [1.0]]) * np.arange(21) * 0.3)
+    assert "turn rate" in violation_rules(calm, ahead + np.array([[0.0], [1.0]]) * np.arange(21) * 0.4)

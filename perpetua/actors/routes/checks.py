@@ -51,9 +51,7 @@ def find_violations(paths: TimedPaths, grid: NavGrid, config: RoutesConfig) -> l
     """Every rule that an actor's path breaks; empty if the routes may be used."""
     fine = paths.finer()
     speed_mps = np.linalg.norm(np.diff(fine.position_m, axis=1), axis=2) / fine.step_s
-    # Acceleration at the paths' own rate: that of a spline peaks at knots without meaning.
-    velocity = np.diff(paths.position_m, axis=1) / paths.step_s
-    acceleration_mps2 = np.linalg.norm(np.diff(velocity, axis=1), axis=2) / paths.step_s
+    acceleration_mps2 = np.linalg.norm(np.diff(fine.position_m, n=2, axis=1), axis=2) / fine.step_s**2
     turn_rate_radps = np.abs(np.diff(fine.heading_rad, axis=1)) / fine.step_s
     violations: list[Violation] = []
     for actor in range(len(fine.position_m)):
@@ -61,8 +59,7 @@ def find_violations(paths: TimedPaths, grid: NavGrid, config: RoutesConfig) -> l
         clearance_m = clearance_at(grid, place_m)
         violations += _worst("clearance", actor, place_m, -clearance_m, -required_clearance_m(grid))
         violations += _worst("speed", actor, place_m, speed_mps[actor], config.max_speed_mps)
-        slow = paths.position_m[actor]
-        violations += _worst("acceleration", actor, slow, acceleration_mps2[actor], config.max_acceleration_mps2, 1)
+        violations += _worst("acceleration", actor, place_m, acceleration_mps2[actor], config.max_acceleration_mps2)
         violations += _worst("turn rate", actor, place_m, turn_rate_radps[actor], config.max_turn_rate_radps)
         violations += _worst("sidestep", actor, place_m, _sidestep_rad(fine, actor), MAX_SIDESTEP_RAD)
         for other in range(actor):
@@ -77,7 +74,6 @@ def _worst(
     place_m: Float64[np.ndarray, "T 2"],
     values: Float64[np.ndarray, " S"],
     limit: float,
-    steps_per_value: int = TIME_RESOLUTION,
     other: int | None = None,
 ) -> list[Violation]:
     worst = int(values.argmax())
@@ -85,7 +81,7 @@ def _worst(
         return []
     x, y = place_m[worst]
     place = (float(x), float(y))
-    return [Violation(rule, actor, worst / steps_per_value, abs(float(values[worst])), abs(limit), place, other)]
+    return [Violation(rule, actor, worst / TIME_RESOLUTION, abs(float(values[worst])), abs(limit), place, other)]
 
 
 def _sidestep_rad(paths: TimedPaths, actor: int) -> Float64[np.ndarray, " S"]:

@@ -44,9 +44,11 @@ def separation_loss(position_m: Float64[Tensor, "A T 2"], wanted_m: float) -> Fl
     return (wanted_m - distance_m).clamp(min=0.0).square().sum() / (actors * position_m.shape[1])
 
 
-def speed_loss(position_m: Float64[Tensor, "A T 2"], step_s: float, limit_mps: float) -> Float64[Tensor, ""]:
-    """Squared excess over a speed."""
-    return (_norm(velocity_mps(position_m, step_s)) - limit_mps).clamp(min=0.0).square().mean()
+def speed_loss(
+    position_m: Float64[Tensor, "A T 2"], step_s: float, limit_mps: Float64[Tensor, " A"]
+) -> Float64[Tensor, ""]:
+    """Squared excess over each actor's highest speed."""
+    return (_norm(velocity_mps(position_m, step_s)) - limit_mps[:, None]).clamp(min=0.0).square().mean()
 
 
 def acceleration_loss(position_m: Float64[Tensor, "A T 2"], step_s: float, limit_mps2: float) -> Float64[Tensor, ""]:
@@ -98,6 +100,22 @@ def variation_loss(position_m: Float64[Tensor, "A T 2"], step_s: float) -> Float
 def walk_loss(position_m: Float64[Tensor, "A T 2"], walk_m: Float64[Tensor, "A T 2"]) -> Float64[Tensor, ""]:
     """Mean squared distance from the random walk."""
     return (position_m - walk_m).square().sum(-1).mean()
+
+
+def pause_loss(
+    position_m: Float64[Tensor, "A T 2"],
+    heading_rad: Float64[Tensor, "A T"],
+    walk_m: Float64[Tensor, "A T 2"],
+    facing_rad: Float64[Tensor, "A T"],
+    pausing: Float64[Tensor, "A T"],
+) -> Float64[Tensor, ""]:
+    """How far actors pause from where they should, squared, and how far they turn from what they should face.
+
+    ``pausing`` is 1 during pauses, else 0. A radian counts like a metre.
+    """
+    away_m2 = (position_m - walk_m).square().sum(-1)
+    turned = 2.0 - 2.0 * (heading_rad - facing_rad).cos()
+    return (pausing * (away_m2 + turned)).mean()
 
 
 def velocity_mps(position_m: Float64[Tensor, "A T 2"], step_s: float) -> Float64[Tensor, "A S 2"]:
