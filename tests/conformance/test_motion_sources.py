@@ -22,6 +22,7 @@ from perpetua.actors.config import MotionConfig
 from perpetua.actors.motion import MOTION_SOURCES
 from perpetua.actors.motion.kinematics import contact_positions, joint_index, joint_positions
 from perpetua.actors.types import BodyMotion, Route
+from perpetua.assets import ASSET_FOLDER_VARIABLE
 from perpetua.seeding import StageSeed
 
 SEED = StageSeed(11, 2, "motion")
@@ -38,7 +39,8 @@ CONFIGS: dict[str, MotionConfig] = {}
 
 @pytest.fixture(scope="module", autouse=True)
 def _configs() -> Iterator[None]:
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setenv(ASSET_FOLDER_VARIABLE, str(Path(folder) / "assets"))
         for source in MOTION_SOURCES:
             CONFIGS[source] = _sample_config(source, Path(folder) / source)
         yield

@@ -1,5 +1,6 @@
 """Writers of motion files, as independent of the readers as can be: matrices to Euler angles, axis-angle, names."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -107,3 +108,33 @@ def _bvh_joint(
     if not children:
         lines += [f"{pad}  End Site", pad + "  {", f"{pad}    OFFSET 0 0 0", pad + "  }"]
     return [*lines, pad + "}"]
+
+
+def install_fake_kimodo(folder: Path, motions: dict[str, BodyMotion], skeleton: Skeleton) -> Path:
+    """Puts the stand-in for Kimodo into a folder, with strides cut out of walks straight along +X.
+
+    Args:
+        folder: where the program goes.
+        motions: word of a prompt -> the walk it stands for; "walk" serves all other prompts.
+        skeleton: bones of the walks, which become Kimodo's.
+    """
+    program = folder / "kimodo_gen"
+    source = Path(__file__).with_name("fake_kimodo.py").read_text(encoding="utf-8")
+    program.write_text(source.replace("/usr/bin/env python3", sys.executable), encoding="utf-8")
+    program.chmod(0o755)
+    for word, motion in motions.items():
+        stands = motion.contacts[:, :2].any(axis=1)
+        first, _, last = np.flatnonzero(stands[1:] & ~stands[:-1])[1:4] + 1
+        pelvis_m = motion.pelvis_m[first:last] @ Y_UP_FROM_OURS.T
+        steps = np.arange(last - first) / (last - first)
+        offset_m = pelvis_m - np.outer(steps, [0.0, 0.0, float(motion.pelvis_m[last, 0] - motion.pelvis_m[first, 0])])
+        offset_m[:, [0, 2]] -= offset_m[:, [0, 2]].mean(axis=0)
+        np.savez(
+            folder / f"stride_{word}.npz",
+            rotation=y_up_rotations(motion)[first:last],
+            offset=offset_m,
+            contacts=motion.contacts[first:last],
+            length=motion.pelvis_m[last, 0] - motion.pelvis_m[first, 0],
+            rest=skeleton.joint_m @ Y_UP_FROM_OURS.T,
+        )
+    return program

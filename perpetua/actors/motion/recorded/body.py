@@ -143,12 +143,13 @@ def _strides(tape: Tape, ride: Ride, going: Going, skeleton: Skeleton) -> Float6
     A foot that stands goes backwards in the frame of the path as fast as the path goes. The part of a foot's place
     along the tape's velocity is therefore replaced by as much along the route's velocity, in the ratio of the speeds.
     """
-    at = _sampled(tape, ride.row)
-    ankle_m = resample_rows(ankles_m(tape, skeleton).reshape(len(tape), 6), np.clip(ride.row, 0.0, len(tape) - 1.0))
-    ankle_m = ankle_m.reshape(-1, 2, 3)
-    middle_m = ankles_m(tape, skeleton).mean(axis=(0, 1))[:2]
-    speed_mps = np.linalg.norm(at.velocity_mps, axis=1)
-    along = at.velocity_mps / np.maximum(speed_mps, 1e-6)[:, None]
+    row = np.clip(ride.row, 0.0, len(tape) - 1.0)
+    velocity_mps = resample_rows(tape.velocity_mps, row)
+    tape_m = ankles_m(tape, skeleton)
+    middle_m = tape_m.mean(axis=(0, 1))[:2]
+    ankle_m = resample_rows(tape_m.reshape(len(tape), 6), row).reshape(-1, 2, 3)
+    speed_mps = np.linalg.norm(velocity_mps, axis=1)
+    along = velocity_mps / np.maximum(speed_mps, 1e-6)[:, None]
     stride = going.velocity_mps / (np.maximum(speed_mps, _STRIDE_TO_MPS) * np.maximum(ride.rate, 0.4))[:, None]
     share = np.clip((speed_mps - _STRIDE_FROM_MPS) / (_STRIDE_TO_MPS - _STRIDE_FROM_MPS), 0.0, 1.0)
     for foot in (0, 1):

@@ -16,28 +16,8 @@ INDEX_FILE = "index.yaml"
 _READERS = {".npz": read_amass, ".bvh": read_bvh_clip}
 # Words that say nothing about what is done.
 _IDLE_WORDS = frozenset(
-    [
-        "a",
-        "an",
-        "and",
-        "the",
-        "of",
-        "in",
-        "on",
-        "with",
-        "while",
-        "to",
-        "at",
-        "is",
-        "are",
-        "it",
-        "his",
-        "her",
-        "their",
-        "person",
-        "man",
-        "woman",
-    ]
+    {"a", "an", "and", "at", "are", "her", "his", "in", "is", "it", "man", "of", "on", "person", "the", "their", "to"}
+    | {"while", "with", "woman"}
 )
 _MOST_INDEX_BYTES = 2**22
 

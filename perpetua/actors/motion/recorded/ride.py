@@ -29,10 +29,10 @@ class Clock:
     at_frames: slice
 
 
-def make_clock(frames: int, fps: float, before_s: float = MARGIN_S) -> Clock:
-    """A fine clock that ticks at every frame, begins ``before_s`` before the first and ends ``MARGIN_S`` after the last."""
+def make_clock(frames: int, fps: float, before_s: float = MARGIN_S, after_s: float = MARGIN_S) -> Clock:
+    """A fine clock that ticks at every frame, from ``before_s`` before the first to ``after_s`` after the last."""
     fine = max(1, int(np.ceil(FINE_HZ / fps)))
-    before, after = (int(np.ceil(margin_s * fps)) * fine for margin_s in (before_s, MARGIN_S))
+    before, after = (int(np.ceil(margin_s * fps - 1e-6)) * fine for margin_s in (before_s, after_s))
     count = (frames - 1) * fine + 1
     time_s = (np.arange(before + count + after) - before) / (fps * fine)
     return Clock(time_s, 1.0 / (fps * fine), slice(before, before + count, fine))
@@ -72,16 +72,16 @@ class Ride:
     stands: Float64[np.ndarray, " N"]
 
 
-def real_time(clock: Clock) -> Ride:
-    """A tape that runs as it was made, its first row at the first frame of the route."""
+def real_time(clock: Clock, lead_s: float) -> Ride:
+    """A tape that runs as it was made; its first row belongs to ``lead_s`` before the first frame."""
     count = len(clock.time_s)
-    return Ride(clock.time_s * TAPE_HZ, np.ones(count), np.zeros(count))
+    return Ride((clock.time_s + lead_s) * TAPE_HZ, np.ones(count), np.zeros(count))
 
 
 def ride_along(tape: Tape, going: Going, clock: Clock) -> Ride:
     """The tape's rows for a route: strides and cadence share what the speeds differ by.
 
-    Stride length and cadence both grow about as the square root of speed (Inman, Ralston and Todd, Human Walking, 1981).
+    Stride length and cadence both grow about as the square root of speed (Inman, Ralston, Todd: Human Walking, 1981).
     While the route stays, the tape goes on until both feet have been put beside each other and waits there.
     """
     holds = _holds(going, clock)
