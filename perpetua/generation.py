@@ -14,13 +14,15 @@ from rich.console import Console
 from perpetua.audit.contact_sheet import write_contact_sheet
 from perpetua.cluster.local import raise_on_sigterm, run_rooms
 from perpetua.config import Config
-from perpetua.errors import ConfigError
+from perpetua.errors import ConfigError, InputError, PerpetuaError
+from perpetua.files import read_json
 from perpetua.pipeline.cost import Cost, check_disk, estimate_cost, gigabytes
 from perpetua.pipeline.events import OnEvent
 from perpetua.pipeline.layout import LOG_FILE, OutputLayout, open_run
 from perpetua.pipeline.progress import Progress
 from perpetua.pipeline.runner import RoomRun
 from perpetua.pipeline.stages import STAGE_NAMES, STAGES
+from perpetua.rooms.build import check_source
 from perpetua.system_libraries import require_libraries
 
 EXIT_INTERRUPTED = 130
@@ -44,7 +46,7 @@ def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> i
     """Makes the sequences asked for.
 
     Returns:
-        0 if every room came out, 1 if some failed, 130 if it was stopped.
+        0 if every room came out, 1 if some failed, 2 if all that failed did for what the user gave, 130 if stopped.
 
     Raises:
         InputError: the request cannot be carried out as it stands.
@@ -52,6 +54,7 @@ def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> i
     say = _speaker(console)
     until = _checked_stage(request.until)
     require_libraries()
+    check_source(request.config.rooms)
     cost = estimate_cost(request.config, len(request.rooms))
     free_bytes = check_disk(cost, request.out)
     _say_cost(request, cost, free_bytes, until, console)
@@ -68,7 +71,15 @@ def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> i
         say(f"stopped; what is done is kept. To go on, run the same command again:\n  {_this_command()}")
         return EXIT_INTERRUPTED
     _say_result(request, failures, until, console)
-    return 1 if failures else 0
+    return _exit_code(request, failures)
+
+
+def _exit_code(request: GenerateRequest, failures: dict[int, str]) -> int:
+    if not failures:
+        return 0
+    layouts = [OutputLayout(request.out, request.config.export.split, request.seed, room) for room in failures]
+    codes = {read_json(layout.failure_file).get("exit_code") for layout in layouts}
+    return InputError.exit_code if codes == {InputError.exit_code} else PerpetuaError.exit_code
 
 
 def make_room(request: GenerateRequest, until: str, room: int, on_event: OnEvent) -> None:

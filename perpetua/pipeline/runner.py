@@ -92,7 +92,8 @@ class RoomRun:
         self._report("message", text=f"draw {self.rejected + 1} rejected by {stage.name}: {error}")
 
     def _note_failure(self, stage: Stage, error: PerpetuaError) -> None:
-        write_json(self.layout.failure_file, {"stage": stage.name, "reason": str(error)})
+        failure = {"stage": stage.name, "reason": str(error), "exit_code": error.exit_code}
+        write_json(self.layout.failure_file, failure)
 
     def _run_stage(self, stage: Stage) -> None:
         folder = store.StageFolder(self.layout.work_folder, stage.number, stage.name)

@@ -2,20 +2,35 @@
 
 import logging
 from collections import Counter
+from dataclasses import asdict
 from pathlib import Path
 
 from perpetua.errors import InputError, PerpetuaError, RoomError
+from perpetua.files import read_json, write_json
 from perpetua.navigation.config import NavigationConfig
 
 # Each source enters itself in ROOM_SOURCES when it is imported.
 from perpetua.rooms import infinigen, procedural, scene_file  # noqa: F401
-from perpetua.rooms.acceptance import RoomRejected, check_room
+from perpetua.rooms.acceptance import RoomFigures, RoomRejected, check_room
 from perpetua.rooms.config import RoomKind, RoomsConfig
-from perpetua.rooms.source import ROOM_SOURCES, draw_wish
+from perpetua.rooms.infinigen import COLLIDER_GAP_FILE
+from perpetua.rooms.source import ROOM_SOURCES, RoomWish, draw_wish
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 
 logger = logging.getLogger(__name__)
+
+# Figures of the room that was accepted and the reasons of those that were not, in the folder of its stage.
+REPORT_FILE = "report.json"
+
+
+def check_source(config: RoomsConfig) -> None:
+    """Passes a config whose source exists and has what it needs.
+
+    Raises:
+        InputError: there is no such source, or it cannot make what is asked for.
+    """
+    ROOM_SOURCES[config.source]().draws(config)
 
 
 def build_room(config: RoomsConfig, navigation: NavigationConfig, seed: StageSeed, scratch: Path) -> Room:
@@ -34,12 +49,32 @@ def build_room(config: RoomsConfig, navigation: NavigationConfig, seed: StageSee
         wish = draw_wish(kind, config, seed.stream("wish", attempt))
         try:
             room = source.make(wish, config, seed, attempt, scratch)
-            check_room(room, config, navigation)
-            return room
+            figures = check_room(room, config, navigation)
         except RoomRejected as rejection:
             logger.info("draw %d of a %s rejected: %s", attempt, kind, rejection)
             rejections.append(rejection)
+            continue
+        _write_report(scratch, room, wish, figures, rejections)
+        return room
     raise _give_up(rejections, kind, limit)
+
+
+def _write_report(
+    scratch: Path, room: Room, wish: RoomWish, figures: RoomFigures, rejections: list[RoomRejected]
+) -> None:
+    """What a person wants to know of a finished room, in its stage's folder."""
+    report = {
+        "kind": room.kind,
+        "wish": asdict(wish),
+        "objects": len(room.objects),
+        **asdict(figures),
+        "redraws": [{"rule": rejection.rule, "reason": str(rejection)} for rejection in rejections],
+    }
+    gap = scratch / COLLIDER_GAP_FILE
+    if gap.is_file():
+        report["collider_gap"] = read_json(gap)
+        gap.unlink()
+    write_json(scratch / REPORT_FILE, report)
 
 
 def _give_up(rejections: list[RoomRejected], kind: RoomKind, limit: int | None) -> PerpetuaError:

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from perpetua.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
+from perpetua.errors import InputError
 from perpetua.rooms.acceptance import RoomRejected
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.scene_file_checks import BadSceneFile, check_scene_file, find_scene_files
@@ -38,9 +39,15 @@ class SceneFileRooms:
         """As many as there are files: each gives one room.
 
         Raises:
-            InputError: ``rooms.file.path`` names no scene.
+            InputError: ``rooms.file.path`` names no scene, or a single one that Blender need not open to refuse it.
         """
-        return len(find_scene_files(config.file.path))
+        files = find_scene_files(config.file.path)
+        if len(files) == 1:
+            try:
+                _check(files[0], config)
+            except RoomRejected as rejection:
+                raise InputError(str(rejection)) from None
+        return len(files)
 
     def make(self, wish: RoomWish, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
         """The room of one file, which the seed picks; the wish is left aside, for the file is what it is.
@@ -51,11 +58,11 @@ class SceneFileRooms:
         """
         files = find_scene_files(config.file.path)
         path = files[int(seed.stream("scene_file").permutation(len(files))[attempt % len(files)])]
+        _check(path, config)
         try:
-            check_scene_file(path, config.file.max_file_mb, MOST_THINNED * config.max_triangles)
             return self._read(path.resolve(), config, scratch)
         except BadSceneFile as bad:
-            raise RoomRejected(bad.rule, f"scene file '{path}': {bad}") from None
+            raise _rejected(path, bad) from None
 
     def _read(self, path: Path, config: RoomsConfig, scratch: Path) -> Room:
         folder = scratch.resolve() / "scene_file"
@@ -83,6 +90,17 @@ class SceneFileRooms:
             shutil.rmtree(folder)
         outline_m = trace_floor(cells)
         return room if outline_m is None else replace(room, floor_polygon_m=outline_m)
+
+
+def _check(path: Path, config: RoomsConfig) -> None:
+    try:
+        check_scene_file(path, config.file.max_file_mb, MOST_THINNED * config.max_triangles)
+    except BadSceneFile as bad:
+        raise _rejected(path, bad) from None
+
+
+def _rejected(path: Path, bad: BadSceneFile) -> RoomRejected:
+    return RoomRejected(bad.rule, f"scene file '{path}': {bad}")
 
 
 def _run_script(folder: Path, timeout_s: float) -> None:

@@ -3,15 +3,20 @@
 A file that anyone may have made is data to distrust. Nothing here decodes pictures or runs anything.
 """
 
+import contextlib
+import hashlib
 import json
 import re
 import struct
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 from perpetua.errors import InputError
+from perpetua.files import file_sha256
 
 SUFFIXES = (".blend", ".glb", ".gltf", ".obj")
 MB = 1e6
@@ -55,6 +60,39 @@ def find_scene_files(path: str | None) -> tuple[Path, ...]:
     if given.suffix.lower() not in SUFFIXES:
         raise InputError(f"rooms.file.path must end in {known}, not '{given.name}': export the scene as one of these")
     return (given,)
+
+
+def scene_digests(path: str | None) -> dict[str, str]:
+    """SHA-256 of each scene file at a path and of what it names directly (a .gltf's files, an .obj's materials).
+
+    Files that cannot be read are left out: whoever makes the room says why.
+    """
+    try:
+        scenes = find_scene_files(path)
+    except InputError:
+        return {}
+    digests: dict[str, str] = {}
+    for scene in scenes:
+        with contextlib.suppress(OSError, BadSceneFile):
+            status = scene.stat()
+            digests[scene.name] = _digest_once(scene, status.st_size, status.st_mtime_ns)
+    return digests
+
+
+@lru_cache(maxsize=1024)
+def _digest_once(scene: Path, size: int, changed_ns: int) -> str:
+    together = hashlib.sha256()
+    for file in (scene, *_referred(scene)):
+        together.update(file_sha256(file).encode())
+    return together.hexdigest()
+
+
+def _referred(scene: Path) -> list[Path]:
+    if scene.suffix.lower() == ".gltf":
+        return [_inside(uri, scene) for uri in _uris(_parse_gltf(scene.read_bytes())) if not _is_data(uri)]
+    if scene.suffix.lower() == ".obj":
+        return [_inside(name, scene) for name in _read_obj(scene).libraries]
+    return []
 
 
 def check_scene_file(path: Path, max_file_mb: float, max_triangles: int) -> None:
@@ -117,23 +155,36 @@ def _check_gltf(path: Path, max_file_mb: float, max_triangles: int) -> None:
 
 
 def _check_gltf_text(text: bytes, path: Path, max_file_mb: float, max_triangles: int) -> None:
+    tree = _parse_gltf(text)
+    referred = [_inside(uri, path) for uri in _uris(tree) if not _is_data(uri)]
+    _check_size([path, *referred], max_file_mb)
+    try:
+        triangles = _gltf_triangles(tree)
+    except (KeyError, IndexError, TypeError, AttributeError, ValueError):
+        raise BadSceneFile("format", "its table of meshes is damaged: export the scene again") from None
+    _check_triangles(triangles, max_triangles)
+
+
+def _check_triangles(triangles: int, max_triangles: int) -> None:
+    if triangles > max_triangles:
+        raise BadSceneFile(
+            "triangles",
+            f"it has {triangles} triangles, and {max_triangles} are allowed: simplify it, or raise rooms.max_triangles",
+        )
+
+
+def _parse_gltf(text: bytes) -> dict[str, Any]:
     try:
         tree = json.loads(text)
     except (ValueError, RecursionError):
         raise BadSceneFile("format", "its JSON is damaged or cut short: export the scene again") from None
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
         raise BadSceneFile("format", "it is no glTF file (no 'asset'): export the scene again")
-    referred = [_inside(uri, path) for uri in _uris(tree) if not uri.startswith("data:")]
-    _check_size([path, *referred], max_file_mb)
-    try:
-        triangles = _gltf_triangles(tree)
-    except (KeyError, IndexError, TypeError, AttributeError, RecursionError):
-        raise BadSceneFile("format", "its table of meshes is damaged: export the scene again") from None
-    if triangles > max_triangles:
-        raise BadSceneFile(
-            "triangles",
-            f"it has {triangles} triangles, and {max_triangles} are allowed: simplify it, or raise rooms.max_triangles",
-        )
+    return tree
+
+
+def _is_data(uri: str) -> bool:
+    return uri.startswith("data:")
 
 
 def _uris(tree: Any) -> Iterator[str]:
@@ -187,7 +238,19 @@ def _primitive_triangles(primitive: dict[str, Any], accessors: list[dict[str, An
     return max(0, corners - 2) if mode in {_TRIANGLE_STRIP, _TRIANGLE_FAN} else 0
 
 
+@dataclass(frozen=True)
+class _ObjContent:
+    triangles: int
+    libraries: tuple[str, ...]
+
+
 def _check_obj(path: Path, max_file_mb: float, max_triangles: int) -> None:
+    content = _read_obj(path)
+    _check_triangles(content.triangles, max_triangles)
+    _check_size([path, *(_inside(name, path) for name in content.libraries)], max_file_mb)
+
+
+def _read_obj(path: Path) -> _ObjContent:
     with path.open("rb") as stream:
         head = stream.read(_OBJ_HEAD_BYTES)
         if b"\0" in head or not any(_OBJ_LINE.match(line) for line in head.splitlines()):
@@ -195,14 +258,9 @@ def _check_obj(path: Path, max_file_mb: float, max_triangles: int) -> None:
         stream.seek(0)
         triangles, libraries = 0, []
         for line in stream:
+            words = line.split(None, 1)
             if line.startswith(b"f "):
                 triangles += max(0, len(line.split()) - 3)
-            elif line.lstrip().startswith(b"mtllib"):
-                libraries.append(line.decode("utf-8", "replace").strip()[len("mtllib") :].strip())
-    if triangles > max_triangles:
-        raise BadSceneFile(
-            "triangles",
-            f"it has {triangles} triangles, and {max_triangles} are allowed: simplify it, or raise rooms.max_triangles",
-        )
-    referred = [_inside(name, path) for name in libraries if name]
-    _check_size([path, *referred], max_file_mb)
+            elif len(words) == 2 and words[0] == b"mtllib":
+                libraries.append(words[1].decode("utf-8", "replace").strip())
+    return _ObjContent(triangles, tuple(libraries))
