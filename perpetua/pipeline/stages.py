@@ -31,6 +31,7 @@ from perpetua.rendering.job import PROCESS_SETTINGS
 from perpetua.rendering.render import RENDER_SCRIPT, render_views
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.build import build_room
+from perpetua.rooms.scene_file_checks import scene_digests
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 from perpetua.tracks.make import make_tracks
@@ -130,6 +131,14 @@ def _settings(*names: str) -> Callable[[Config], dict[str, Any]]:
         return picked
 
     return pick
+
+
+def _room_settings(config: Config) -> dict[str, Any]:
+    """A scene file counts by its content, not by its name alone."""
+    settings = _settings("rooms", "navigation")(config)
+    if config.rooms.source == "file":
+        settings["scenes"] = scene_digests(config.rooms.file.path)
+    return settings
 
 
 def _room(context: StageContext) -> Room:
@@ -282,9 +291,9 @@ STAGES = (
         "room",
         1,
         (),
-        _settings("rooms", "navigation"),
+        _room_settings,
         _room,
-        scripts=("infinigen_room.py",),
+        scripts=("infinigen_room.py", "scene_file.py"),
         redraw=_when_routes_are_spent,
     ),
     Stage(20, "navigation", 2, ("room",), _settings("navigation"), _navigation),
