@@ -51,13 +51,13 @@ _PATTERNS = tuple(
         (r"desk", "desk"),
         (r"tv_storage", "tv_stand"),
         (r"wall_board_shelf|wall_shelf|board_shelf", "wall_shelf"),
+        (r"storage_box", "box"),
         (r"(wall_)?storage\w*|wall_cubby|cubby", "cabinet"),
         (r"plant\w*", "plant"),
         (r"vase\w*", "vase"),
         (r"bowl\w*", "bowl"),
         (r"cup\w*", "cup"),
         (r"book_(stack|row)", "books"),
-        (r"storage_box", "box"),
         (r"jar", "jar"),
         (r"bottle", "bottle"),
         (r"candle", "candle"),
@@ -68,6 +68,46 @@ _PATTERNS = tuple(
 
 # A person may stand on the upward faces of these.
 WALKABLE = frozenset({"floor", "rug"})
+
+# Small things: where one hangs in the air it may fall or be left out, and the room stays what it is.
+SMALL = frozenset(
+    {
+        "books",
+        "bottle",
+        "bowl",
+        "box",
+        "candle",
+        "clutter",
+        "cup",
+        "cushion",
+        "jar",
+        "picture_frame",
+        "pillow",
+        "plant",
+        "table_lamp",
+        "towels",
+        "vase",
+    }
+)
+
+# Furniture that stands on the floor.
+STANDING = frozenset(
+    {
+        "bed",
+        "bedside_table",
+        "chair",
+        "cocktail_table",
+        "coffee_table",
+        "desk",
+        "desk_chair",
+        "dining_table",
+        "floor_lamp",
+        "side_table",
+        "sofa",
+        "stool",
+        "table",
+    }
+)
 
 # Panes of glass in these are openings that one looks through.
 GLAZED = frozenset({"window", "door", "cabinet", "kitchen_cabinet", "bathroom_cabinet", "tv_stand", "ceiling_lamp"})

@@ -15,7 +15,9 @@ import bpy
 import numpy as np
 import procfunc
 from infinigen2.objects import bowl, plant_pot, vase
+from infinigen_categories import category_of
 from mathutils import Matrix
+from plain_meshes import thin_leaves, thin_out
 
 Color = tuple[float, float, float]
 
@@ -38,6 +40,7 @@ PAPER: Color = (0.78, 0.73, 0.62)
 WOOD: Color = (0.32, 0.17, 0.08)
 WAX: Color = (0.82, 0.76, 0.64)
 ROUND_SEGMENTS = 24
+MAX_TRIANGLES = 4_000
 SHARP_ANGLE_RAD = math.radians(35.0)
 
 
@@ -51,12 +54,18 @@ Maker = Callable[[np.random.Generator], SmallThing]
 
 
 def small_thing_maker(kind: str) -> Maker:
-    """A maker of things that suit a kind of room."""
+    """A maker of things that suit a kind of room, each of a few thousand triangles at most."""
     makers, weights = zip(*_SUITABLE[kind], strict=True)
     shares = np.array(weights) / sum(weights)
 
     def make(rng: np.random.Generator, **_: object) -> SmallThing:
-        return makers[int(rng.choice(len(makers), p=shares))](rng)
+        made = makers[int(rng.choice(len(makers), p=shares))](rng)
+        thing = made.mesh.item()
+        # Subdivision would come on top of what is dense already.
+        thing.modifiers.clear()
+        thin = thin_leaves if category_of(thing.name) == "plant" else thin_out
+        thin([thing], [MAX_TRIANGLES])
+        return made
 
     return make
 

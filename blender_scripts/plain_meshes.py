@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Turns modified, parented objects into plain meshes that Cycles loads fast, and reads their triangles."""
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -8,6 +9,8 @@ import numpy as np
 MAX_SUBDIVISION = 3
 # Flat structure keeps its look with less.
 MAX_STRUCTURE_SUBDIVISION = 2
+# A connected part of a plant with less than this share of its triangles is a leaf, or a bunch of them.
+LEAF_SHARE = 0.03
 
 
 def cap_subdivision(thing: bpy.types.Object, max_level: int, max_triangles: int) -> None:
@@ -52,24 +55,69 @@ def _sharing_key(thing: bpy.types.Object) -> tuple:
     return thing.data.name, materials, levels
 
 
+def triangle_count(mesh: bpy.types.Mesh) -> int:
+    """Triangles that the mesh renders as."""
+    return len(mesh.loops) - 2 * len(mesh.polygons)
+
+
 def thin_out(things: list[bpy.types.Object], max_triangles: list[int]) -> None:
     """Collapses edges of meshes that have more triangles than allowed; objects that share a mesh change alike."""
-    heavy: dict[str, bpy.types.Object] = {}
-    for thing, limit in zip(things, max_triangles, strict=True):
-        triangles = sum(len(face.vertices) - 2 for face in thing.data.polygons)
-        if triangles > limit and thing.data.name not in heavy:
-            thing.modifiers.new("thin_out", "DECIMATE").ratio = limit / triangles
-            heavy[thing.data.name] = thing
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    thinner = [
-        bpy.data.meshes.new_from_object(
+    for thing, limit in _too_heavy(things, max_triangles):
+        thing.modifiers.new("thin_out", "DECIMATE").ratio = limit / triangle_count(thing.data)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        mesh = bpy.data.meshes.new_from_object(
             thing.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
         )
-        for thing in heavy.values()
-    ]
-    for thing, mesh in zip(heavy.values(), thinner, strict=True):
         thing.modifiers.clear()
-        thing.data.user_remap(mesh)
+        _replace_mesh(thing.data, mesh)
+
+
+def thin_leaves(things: list[bpy.types.Object], max_triangles: list[int]) -> None:
+    """Takes leaves, evenly chosen, from plants that have more triangles than allowed.
+
+    A leaf may be a single face, which collapsing edges would take away before anything else.
+    """
+    for thing, limit in _too_heavy(things, max_triangles):
+        editable = bmesh.new()
+        editable.from_mesh(thing.data)
+        parts = _connected_faces(editable)
+        total = triangle_count(thing.data)
+        leaves = [faces for faces in parts if len(faces) < LEAF_SHARE * len(editable.faces)]
+        in_leaves = sum(len(face.verts) - 2 for faces in leaves for face in faces)
+        kept = min(1.0, max(0.0, (limit - (total - in_leaves)) / max(in_leaves, 1)))
+        gone = [faces for k, faces in enumerate(leaves) if int((k + 1) * kept) == int(k * kept)]
+        bmesh.ops.delete(editable, geom=[face for faces in gone for face in faces], context="FACES")
+        editable.to_mesh(thing.data)
+        editable.free()
+
+
+def _too_heavy(things: list[bpy.types.Object], max_triangles: list[int]) -> list[tuple[bpy.types.Object, int]]:
+    """One object of each mesh that has more triangles than its first user may have, and that number."""
+    first = {thing.data.name: (thing, limit) for thing, limit in zip(things[::-1], max_triangles[::-1], strict=True)}
+    return [(thing, limit) for thing, limit in first.values() if triangle_count(thing.data) > limit]
+
+
+def _connected_faces(editable: bmesh.types.BMesh) -> list[list[bmesh.types.BMFace]]:
+    parts, seen = [], set()
+    for start in editable.faces:
+        if start in seen:
+            continue
+        seen.add(start)
+        part, waiting = [start], [start]
+        while waiting:
+            for edge in waiting.pop().edges:
+                for face in edge.link_faces:
+                    if face not in seen:
+                        seen.add(face)
+                        part.append(face)
+                        waiting.append(face)
+        parts.append(part)
+    return parts
+
+
+def _replace_mesh(old: bpy.types.Mesh, new: bpy.types.Mesh) -> None:
+    old.user_remap(new)
+    bpy.data.meshes.remove(old)
 
 
 def unparent(things: list[bpy.types.Object]) -> None:

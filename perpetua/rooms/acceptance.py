@@ -1,5 +1,7 @@
 """Which rooms are good enough to go on with; a room that is not is drawn again."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from perpetua.errors import NavigationError
@@ -29,7 +31,15 @@ class RoomRejected(Exception):
         self.rule = rule
 
 
-def check_room(room: Room, config: RoomsConfig, navigation: NavigationConfig) -> None:
+@dataclass(frozen=True)
+class RoomFigures:
+    """What was measured of an accepted room."""
+
+    triangles: int
+    free_floor_m2: float
+
+
+def check_room(room: Room, config: RoomsConfig, navigation: NavigationConfig) -> RoomFigures:
     """Passes a room that has what the later stages need.
 
     Raises:
@@ -39,14 +49,15 @@ def check_room(room: Room, config: RoomsConfig, navigation: NavigationConfig) ->
     """
     _check_object_indices(room)
     _check_vertices(room)
-    _check_triangles(room, config.max_triangles)
+    triangles = _check_triangles(room, config.max_triangles)
     # Of a scene that a user brings nobody has said what it should be, and what hangs in it may be meant to.
     described = room.kind in REQUIRED_FURNITURE
     if described:
         _check_furniture(room)
-    _check_free_floor(room, config.min_free_floor_m2, navigation)
+    free_floor_m2 = _check_free_floor(room, config.min_free_floor_m2, navigation)
     if described:
         _check_support(room)
+    return RoomFigures(triangles, free_floor_m2)
 
 
 def _check_object_indices(room: Room) -> None:
@@ -65,10 +76,11 @@ def _check_vertices(room: Room) -> None:
             raise RoomRejected("finite vertices", f"every vertex must be finite, but some of '{thing.name}' are not")
 
 
-def _check_triangles(room: Room, max_triangles: int) -> None:
+def _check_triangles(room: Room, max_triangles: int) -> int:
     triangles = sum(len(thing.mesh.faces) for thing in room.objects)
     if triangles > max_triangles:
         raise RoomRejected("triangles", f"the room has {triangles} triangles; rooms.max_triangles is {max_triangles}")
+    return triangles
 
 
 def _check_furniture(room: Room) -> None:
@@ -79,7 +91,7 @@ def _check_furniture(room: Room) -> None:
             raise RoomRejected("furniture", f"a {room.kind} needs {wanted}, and this one has none")
 
 
-def _check_free_floor(room: Room, min_free_floor_m2: float, navigation: NavigationConfig) -> None:
+def _check_free_floor(room: Room, min_free_floor_m2: float, navigation: NavigationConfig) -> float:
     try:
         free_floor_m2 = build_nav_grid(room, navigation).free_floor_m2
     except NavigationError as error:
@@ -90,6 +102,7 @@ def _check_free_floor(room: Room, min_free_floor_m2: float, navigation: Navigati
             f"{free_floor_m2:.1f} square metres of connected floor are free; "
             f"rooms.min_free_floor_m2 is {min_free_floor_m2:.1f}",
         )
+    return free_floor_m2
 
 
 def _check_support(room: Room) -> None:

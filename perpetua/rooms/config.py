@@ -57,6 +57,9 @@ class RoomsConfig(Section):
     )
     max_redraws: int = Field(5, ge=0, le=50, description="further rooms tried when one is rejected")
     timeout_s: float = Field(600.0, ge=10.0, description="longest time to generate one room, seconds")
+    max_memory_mb: float = Field(
+        4000.0, ge=500.0, description="memory that the process which generates a room may take, megabytes"
+    )
     max_triangles: int = Field(3_000_000, ge=1000, description="triangles allowed in one room")
     file: SceneFileConfig = Field(default_factory=SceneFileConfig)
 

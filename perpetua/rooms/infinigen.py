@@ -3,11 +3,17 @@
 import importlib.util
 import json
 import shutil
+from dataclasses import asdict
 from pathlib import Path
+
+import numpy as np
 
 from perpetua.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.errors import EnvironmentSetupError
+from perpetua.files import write_json
+from perpetua.geometry.mesh import TriMesh
 from perpetua.rooms.acceptance import RoomRejected
+from perpetua.rooms.collider_gap import ColliderGap, collider_gap
 from perpetua.rooms.config import RoomKind, RoomsConfig
 from perpetua.rooms.script_output import read_room
 from perpetua.rooms.source import ROOM_SOURCES, RoomWish
@@ -15,13 +21,20 @@ from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
 
 SCRIPT = SCRIPT_FOLDER / "infinigen_room.py"
+# How far Infinigen's colliders are from what is rendered, beside the room.
+COLLIDER_GAP_FILE = "collider_gap.json"
 # Infinigen furnishes a bathroom with few things: at full size most of it would be empty floor.
 SIDE_SCALE: dict[RoomKind, float] = {"bathroom": 0.8}
 
 
 @ROOM_SOURCES.register("infinigen")
 class InfinigenRooms:
-    """Furnished rooms by Infinigen Indoors 2 (https://infinigen.org)."""
+    """Furnished rooms by Infinigen Indoors 2 (https://infinigen.org).
+
+    Infinigen's own colliders are its meshes before subdivision, without skirting boards and ceiling details. Navigation
+    and distance fields here use the meshes as rendered instead, which is stricter: nothing in the picture is missing
+    from them. How far the two are apart is measured for each room (``collider_gap``).
+    """
 
     def draws(self, config: RoomsConfig) -> int | None:
         """Without end."""
@@ -32,7 +45,8 @@ class InfinigenRooms:
 
         Raises:
             EnvironmentSetupError: Infinigen 2 is not installed.
-            RoomRejected: the generator crashed or took longer than ``rooms.timeout_s``.
+            RoomRejected: the generator crashed, took longer than ``rooms.timeout_s`` or more than
+                ``rooms.max_memory_mb``.
         """
         if importlib.util.find_spec("infinigen2") is None:
             raise EnvironmentSetupError(
@@ -46,12 +60,16 @@ class InfinigenRooms:
             "kind": wish.kind,
             "seed": int(seed.stream("infinigen", attempt).integers(2**31)),
             "dimensions_m": dimensions_m(wish),
+            "daytime": wish.daytime,
+            "lamps_on": wish.lamps_on,
+            "max_memory_mb": config.max_memory_mb,
             "folder": str(folder),
         }
         (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
-        _run_script(folder, config.timeout_s)
+        _run_script(folder, config)
         (folder / "room.blend").replace(scratch / "room.blend")
         room = read_room(folder, f"infinigen_{wish.kind}", scratch / "room.blend")
+        write_json(scratch / COLLIDER_GAP_FILE, asdict(_collider_gap(folder, room)))
         shutil.rmtree(folder)
         return room
 
@@ -63,14 +81,26 @@ def dimensions_m(wish: RoomWish) -> list[float]:
     return [round(scale * x_m, 2), round(scale * y_m, 2), height_m]
 
 
-def _run_script(folder: Path, timeout_s: float) -> None:
-    def no_events(event: Event) -> None:
-        pass
+def _run_script(folder: Path, config: RoomsConfig) -> None:
+    refusals: list[Event] = []
 
+    def on_event(event: Event) -> None:
+        if event["event"] == "refused":
+            refusals.append(event)
+
+    timeout_s = config.timeout_s
     job_path = folder / "job.json"
     try:
-        run_script(SCRIPT, job_path, blender=None, scratch=folder, silence_timeout_s=timeout_s, on_event=no_events)
+        run_script(SCRIPT, job_path, blender=None, scratch=folder, silence_timeout_s=timeout_s, on_event=on_event)
     except BlenderError as error:
+        if refusals:
+            raise RoomRejected(refusals[0]["rule"], refusals[0]["reason"]) from None
         if error.silent:
             raise RoomRejected("timeout", f"Infinigen took longer than rooms.timeout_s = {timeout_s:.0f} s") from None
         raise RoomRejected("crash", f"Infinigen failed: {error}") from None
+
+
+def _collider_gap(folder: Path, room: Room) -> ColliderGap:
+    with np.load(folder / "meshes.npz", allow_pickle=False) as arrays:
+        colliders = TriMesh(arrays["collider_vertices_m"], arrays["collider_faces"])
+    return collider_gap(room.objects, colliders)

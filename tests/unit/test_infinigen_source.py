@@ -14,7 +14,7 @@ from perpetua.errors import EnvironmentSetupError, RoomError
 from perpetua.navigation.config import NavigationConfig
 from perpetua.rooms import infinigen
 from perpetua.rooms.acceptance import RoomRejected
-from perpetua.rooms.build import build_room
+from perpetua.rooms.build import REPORT_FILE, build_room
 from perpetua.rooms.config import RoomKind, RoomsConfig
 from perpetua.rooms.infinigen import InfinigenRooms, dimensions_m
 from perpetua.rooms.source import RoomWish, draw_wish
@@ -39,7 +39,8 @@ folder = Path(job["folder"])
 vertices_m = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1],
                        [-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]], np.float64)
 faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 1, 2], [0, 2, 3]], np.int32)
-np.savez(folder / "meshes.npz", vertices_m=vertices_m, faces=faces, vertex_start=[0, 4, 8], face_start=[0, 4, 6])
+np.savez(folder / "meshes.npz", vertices_m=vertices_m, faces=faces, vertex_start=[0, 4, 8], face_start=[0, 4, 6],
+         collider_vertices_m=vertices_m[4:] - [0, 0, 0.01], collider_faces=faces[4:])
 objects = [
     {"object_index": 1, "name": "bed", "category": "bed", "walkable": False, "opaque": True},
     {"object_index": 2, "name": "room_floor_00", "category": "floor", "walkable": True, "opaque": True},
@@ -118,9 +119,42 @@ def test_the_room_comes_back_as_the_script_wrote_it(monkeypatch: pytest.MonkeyPa
     assert np.array_equal(floor.vertices_m, [[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]])
     assert np.array_equal(floor.faces, [[0, 1, 2], [0, 2, 3]])
     assert room.kind == "bedroom" and room.next_object_index == 3
-    # The .blend is all that stays, beside the room.
+    # The .blend is all that stays, beside the room, and how far the colliders are off.
     assert room.blend_path == tmp_path / "room.blend"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["room.blend", "script.py"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["collider_gap.json", "room.blend", "script.py"]
+    gap = json.loads((tmp_path / "collider_gap.json").read_text())
+    # Most of the surface is the floor, whose collider lies a centimetre below; the tetrahedron has none.
+    assert gap["median_m"] == pytest.approx(0.01, abs=1e-4)
+    assert gap["max_m"] == pytest.approx(0.5)
+    assert 0.01 < gap["share_beyond_2_cm"] < 0.1
+
+
+def test_the_wish_reaches_the_generator(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    _use_script(monkeypatch, tmp_path, WRITE_ROOM)
+    wished = RoomWish("kitchen", (6.0, 5.5, 2.7), "night", False)
+    room = InfinigenRooms().make(wished, CONFIG.model_copy(update={"max_memory_mb": 900.0}), SEED, 0, tmp_path)
+    assert room.blend_path is not None
+    job = json.loads(room.blend_path.read_text())
+    assert (job["kind"], job["daytime"], job["lamps_on"]) == ("kitchen", "night", False)
+    assert job["dimensions_m"] == dimensions_m(wished)
+    assert job["max_memory_mb"] == 900.0
+
+
+def test_a_generator_that_takes_too_much_memory_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    scripts = str(Path(infinigen.SCRIPT).parent)
+    greedy = f"""
+import sys, time
+sys.path.insert(0, {scripts!r})
+from worker_link import Worker
+from infinigen_watchdog import Watchdog
+Watchdog(Worker(), 200.0).start()
+hoard = bytearray(300_000_000)
+time.sleep(30)
+"""
+    _use_script(monkeypatch, tmp_path, greedy)
+    with pytest.raises(RoomRejected, match=r"rooms\.max_memory_mb = 200") as rejection:
+        InfinigenRooms().make(wish("kitchen"), CONFIG, SEED, 0, tmp_path)
+    assert rejection.value.rule == "memory"
 
 
 def test_the_job_depends_on_seed_and_attempt_alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -168,6 +202,22 @@ def test_redraws_are_counted_by_reason(monkeypatch: pytest.MonkeyPatch, tmp_path
     config = RoomsConfig(kinds=("kitchen",), max_redraws=2)
     with pytest.raises(RoomError, match=r"3 draws of a kitchen.*furniture \(3 x\)"):
         build_room(config, NavigationConfig(), SEED, tmp_path)
+
+
+def test_the_report_tells_figures_and_redraws(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    flag = f"from pathlib import Path\nflag = Path({str(tmp_path / 'flag')!r})\n"
+    fail_once = flag + "if not flag.exists():\n    flag.touch()\n    raise SystemExit('first draw')\n"
+    _use_script(monkeypatch, tmp_path, fail_once + WRITE_ROOM)
+    build_room(RoomsConfig(kinds=("bedroom",), daytimes=("night",)), NavigationConfig(), SEED, tmp_path)
+    report = json.loads((tmp_path / REPORT_FILE).read_text())
+    assert (report["kind"], report["objects"], report["triangles"]) == ("bedroom", 2, 6)
+    assert report["wish"]["daytime"] == "night"
+    # Six metres square less 0.28 m on every side and what the bed takes.
+    assert 25.0 < report["free_floor_m2"] < 29.6
+    assert [redraw["rule"] for redraw in report["redraws"]] == ["crash"]
+    assert "first draw" in report["redraws"][0]["reason"]
+    assert report["collider_gap"]["max_m"] == pytest.approx(0.5)
+    assert not (tmp_path / "collider_gap.json").exists()
 
 
 def test_a_rejected_draw_is_followed_by_another(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lets things that hang a little in the air down on what is below them, and leaves out small things that cannot be.
+
+Infinigen places things by their unsubdivided meshes, so on a sofa whose seat is rounded in the picture a cushion may
+hang some centimetres above it.
+"""
+
+import bpy
+import numpy as np
+from infinigen_categories import SMALL, STANDING
+from mathutils import Vector
+from plain_meshes import world_triangles
+
+# What is closer than this to its support stays; what would fall further is not where it was meant to be.
+CLOSE_M, FURTHEST_M = 0.01, 0.15
+PLACES_PER_SIDE = 16
+MIN_SPACING_M = 0.01
+MAX_SURFACES = 8
+# Rays start this much beside a mesh's corners: along its own edges they would meet nothing else.
+_ASIDE_M = np.array([0.0007, 0.0004, 0.0])
+_PAST_SURFACE_M = 1e-4
+
+
+def settle(things: list[bpy.types.Object], categories: list[str]) -> list[bpy.types.Object]:
+    """Moves things down to their supports, the lowest first; returns those that should be left out."""
+    loose = [
+        (world_triangles(thing)[0], thing, category)
+        for thing, category in zip(things, categories, strict=True)
+        if category in SMALL | STANDING
+    ]
+    loose = [entry for entry in loose if len(entry[0])]
+    gone = []
+    for vertices_m, thing, category in sorted(loose, key=lambda entry: (entry[0][:, 2].min(), entry[1].name)):
+        gap_m = _gap_m(thing, vertices_m)
+        if CLOSE_M < gap_m <= FURTHEST_M:
+            thing.location.z -= gap_m
+            bpy.context.view_layer.update()
+        elif gap_m > FURTHEST_M and category in SMALL:
+            gone.append(thing)
+            # Nothing shall settle on it.
+            thing.hide_viewport = True
+            bpy.context.view_layer.update()
+    return gone
+
+
+def _gap_m(thing: bpy.types.Object, vertices_m: np.ndarray) -> float:
+    """How far the thing would fall; 0 where something crosses its underside within reach."""
+    places_m = _underside_m(vertices_m) + _ASIDE_M
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return min(_fall_m(depsgraph, thing, place_m) for place_m in places_m)
+
+
+def _fall_m(depsgraph: bpy.types.Depsgraph, thing: bpy.types.Object, place_m: np.ndarray) -> float:
+    # From a little above, so that what the thing is sunk into or exactly rests on is met.
+    start = Vector(place_m) + Vector((0.0, 0.0, CLOSE_M))
+    travelled_m = 0.0
+    for _ in range(MAX_SURFACES):
+        hit, where, _, _, other, _ = bpy.context.scene.ray_cast(depsgraph, start, Vector((0.0, 0.0, -1.0)))
+        if not hit:
+            return float("inf")
+        travelled_m += start.z - where.z
+        if other.name != thing.name:
+            return max(0.0, travelled_m - CLOSE_M)
+        start = where - Vector((0.0, 0.0, _PAST_SURFACE_M))
+        travelled_m += _PAST_SURFACE_M
+    return float("inf")
+
+
+def _underside_m(vertices_m: np.ndarray) -> np.ndarray:
+    """The lowest vertex of each cell of a grid over the ground."""
+    low_m, size_m = vertices_m.min(axis=0), np.ptp(vertices_m, axis=0)
+    spacing_m = max(float(size_m[:2].max()) / PLACES_PER_SIDE, MIN_SPACING_M)
+    vertices_m = vertices_m[np.argsort(vertices_m[:, 2], kind="stable")]
+    cell = np.floor((vertices_m - low_m)[:, :2] / spacing_m).astype(np.int64)
+    _, first = np.unique(cell[:, 0] * (PLACES_PER_SIDE + 2) + cell[:, 1], return_index=True)
+    return vertices_m[np.sort(first)]
