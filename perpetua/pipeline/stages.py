@@ -1,7 +1,7 @@
 """The stage table: what runs, in which order, from which settings. Reading it top to bottom is the pipeline."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -48,6 +48,7 @@ SEQUENCE_FOLDER = "sequence"
 ACTOR_FIGURES = "validation.json"
 CAMERA_FIGURES = "plan.json"
 MOTION_FIGURES = "motion.json"
+SIGHT_FIGURES = "sight.json"
 # Where Blender's job and its finished frames lie, inside the folder of the render stage.
 RENDER_JOB_FOLDER = "job"
 
@@ -248,7 +249,7 @@ def _render(context: StageContext) -> tuple[RenderedView, ...]:
 
 
 def _tracks(context: StageContext) -> SequenceTracks:
-    return make_tracks(
+    tracks = make_tracks(
         context.one("room", Room),
         context.many("actors", ActorMesh),
         context.many("cameras", CameraPath),
@@ -256,6 +257,8 @@ def _tracks(context: StageContext) -> SequenceTracks:
         context.config.tracks,
         context.seed,
     )
+    write_json(context.folder / SIGHT_FIGURES, asdict(tracks.report))
+    return tracks
 
 
 def _export(context: StageContext) -> None:
@@ -278,6 +281,7 @@ def _audit(context: StageContext) -> None:
         "actors": read_json(context.stage_folders["actors"] / ACTOR_FIGURES),
         "cameras": read_json(context.stage_folders["cameras"] / CAMERA_FIGURES),
         "motion": read_json(context.stage_folders["cameras"] / MOTION_FIGURES),
+        "visibility": read_json(context.stage_folders["tracks"] / SIGHT_FIGURES),
     }
     write_json(context.folder / layout.AUDIT, figures)
     if not report.passed:
@@ -327,7 +331,7 @@ STAGES = (
         resumable=True,
         leftovers=(RENDER_JOB_FOLDER,),
     ),
-    Stage(80, "tracks", 1, ("room", "actors", "cameras", "render"), _settings("tracks"), _tracks),
+    Stage(80, "tracks", 2, ("room", "actors", "cameras", "render"), _settings("tracks"), _tracks),
     Stage(
         90,
         "export",
@@ -336,6 +340,6 @@ STAGES = (
         lambda config: config.model_dump(mode="json"),
         _export,
     ),
-    Stage(95, "audit", 2, ("actors", "cameras", "export"), _settings("audit"), _audit),
+    Stage(95, "audit", 3, ("actors", "cameras", "tracks", "export"), _settings("audit"), _audit),
 )
 STAGE_NAMES = tuple(stage.name for stage in STAGES)

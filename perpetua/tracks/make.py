@@ -17,12 +17,14 @@ from perpetua.tracks.motion import MOVING_M, travel_m
 from perpetua.tracks.queries import draw_queries, project_tracks
 from perpetua.tracks.selection import seen_cells, spread
 from perpetua.tracks.sides import SideTable
-from perpetua.tracks.surface import SceneMeshes, SurfacePoints, bind, join_points
+from perpetua.tracks.sight import HairFaces, SceneSight, hair_faces
+from perpetua.tracks.surface import BoundPoints, SceneMeshes, SurfacePoints, bind, join_points
 from perpetua.tracks.types import PointTracks, SequenceTracks
-from perpetua.tracks.visibility import visible_in_views
+from perpetua.tracks.visibility import Sightings, visible_in_views
 
 # Usable points per track wanted, before drawing stops.
 SPARE = 1.5
+SCANNED_FRAMES = 32
 
 
 def make_tracks(
@@ -51,7 +53,7 @@ def make_tracks(
         TrackError: too few points are seen.
     """
     meshes = SceneMeshes.of(room, actors)
-    collector = _Collector(meshes, cameras, views, config, seed)
+    collector = _Collector(meshes, hair_faces(actors), cameras, views, config, seed)
     moving = round(config.dynamic_share * config.count) if actors else 0
     surfaces = StaticSurfaces(meshes, cameras, views)
     still = collector.collect("static", config.count - moving, False, surfaces.draw)
@@ -60,10 +62,10 @@ def make_tracks(
     points = points.take(seed.stream("order").permutation(len(points)))
     bound = bind(meshes, points)
     position_m = bound.position_m(len(views[0].depth_m))
-    visible = visible_in_views(bound, collector.sides.of(points), cameras, views, config)
-    seen = project_tracks(position_m, cameras, visible)
+    sightings = collector.look(bound, np.arange(len(position_m)))
+    seen = project_tracks(position_m, cameras, sightings.visible)
     tracks = PointTracks(position_m, points.object_index, points.face, points.barycentric)
-    return SequenceTracks(tracks, seen, draw_queries(seen))
+    return SequenceTracks(tracks, seen, draw_queries(seen), sightings.report)
 
 
 class _Collector:
@@ -72,13 +74,22 @@ class _Collector:
     def __init__(
         self,
         meshes: SceneMeshes,
+        hair: HairFaces,
         cameras: tuple[CameraPath, ...],
         views: tuple[RenderedView, ...],
         config: TracksConfig,
         seed: StageSeed,
     ) -> None:
         self.meshes, self.cameras, self.views, self.config, self.seed = meshes, cameras, views, config, seed
-        self.sides = SideTable(meshes)
+        self.hair, self.sides, self.sight = hair, SideTable(meshes), SceneSight(meshes)
+        # Candidates are looked at in some frames, even distances apart; what is seen often enough there, is.
+        frames = len(views[0].depth_m)
+        self.scanned = np.unique(np.linspace(0, frames - 1, SCANNED_FRAMES).round().astype(np.int64))
+
+    def look(self, bound: BoundPoints, frames: Int64[np.ndarray, " S"]) -> Sightings:
+        """Where points are visible at some frames."""
+        sides = self.sides.of(bound.points)
+        return visible_in_views(bound, sides, self.sight, self.hair, self.cameras, self.views, frames, self.config)
 
     def collect(
         self,
@@ -96,7 +107,7 @@ class _Collector:
             return join_points([])
         enough = int(np.ceil(SPARE * wanted))
         groups: list[SurfacePoints] = []
-        seen: list[Bool[np.ndarray, "C T N"]] = []
+        seen: list[Bool[np.ndarray, "C S N"]] = []
         drawn = found = 0
         for attempt in range(self.config.max_draws):
             points = draw(int(np.ceil(self.config.candidates * wanted)), self.seed.stream(name, attempt))
@@ -114,17 +125,16 @@ class _Collector:
             )
         return self._spread(name, wanted, join_points(groups), np.concatenate(seen, axis=2))
 
-    def _usable(self, points: SurfacePoints, moving: bool) -> tuple[Int64[np.ndarray, " M"], Bool[np.ndarray, "C T N"]]:
+    def _usable(self, points: SurfacePoints, moving: bool) -> tuple[Int64[np.ndarray, " M"], Bool[np.ndarray, "C S N"]]:
         bound = bind(self.meshes, points)
-        visible = visible_in_views(bound, self.sides.of(points), self.cameras, self.views, self.config)
+        visible = self.look(bound, self.scanned).visible
         usable = visible.sum(axis=(0, 1)) >= self.config.min_visible
         if moving:
-            usable &= travel_m(bound.position_m(visible.shape[1])) > MOVING_M
+            usable &= travel_m(bound.position_m(len(self.views[0].depth_m))) > MOVING_M
         return np.flatnonzero(usable), visible
 
     def _spread(
-        self, name: str, wanted: int, points: SurfacePoints, visible: Bool[np.ndarray, "C T N"]
+        self, name: str, wanted: int, points: SurfacePoints, visible: Bool[np.ndarray, "C S N"]
     ) -> SurfacePoints:
-        position_m = bind(self.meshes, points).position_m(visible.shape[1])
-        cells = seen_cells(position_m, self.cameras, visible)
+        cells = seen_cells(bind(self.meshes, points), self.cameras, self.scanned, visible)
         return points.take(spread(wanted, points.object_index, cells, self.seed.stream(name, "spread")))

@@ -1,12 +1,13 @@
 """Which candidates become tracks: those that spread best over objects, image area, views and time."""
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64
+from jaxtyping import Bool, Int32, Int64
 from scipy.sparse import csr_matrix
 
 from perpetua.cameras.types import CameraPath
 from perpetua.geometry.pinhole import project
 from perpetua.geometry.transforms import invert_rigid, transform_points
+from perpetua.tracks.surface import BoundPoints
 
 IMAGE_CELLS = 8
 TIMES = 16
@@ -54,19 +55,23 @@ def spread(
 
 
 def seen_cells(
-    position_m: Float64[np.ndarray, "T N 3"], cameras: tuple[CameraPath, ...], visible: Bool[np.ndarray, "C T N"]
+    bound: BoundPoints,
+    cameras: tuple[CameraPath, ...],
+    frames: Int64[np.ndarray, " S"],
+    visible: Bool[np.ndarray, "C S N"],
 ) -> csr_matrix:
-    """Candidates x (view, time, image cell) at ``TIMES`` frames: 1 where the candidate is seen."""
-    views, frames, count = visible.shape
-    times = np.unique(np.linspace(0, frames - 1, TIMES).round().astype(int))
+    """Candidates x (view, time, image cell) at up to ``TIMES`` of the frames: 1 where the candidate is seen."""
+    views, scanned, count = visible.shape
+    times = np.unique(np.linspace(0, scanned - 1, TIMES).round().astype(int))
+    position_m = [bound.point_m(frame) for frame in frames[times].tolist()]
     rows: list[Int64[np.ndarray, " B"]] = []
     columns: list[Int64[np.ndarray, " B"]] = []
     for view, camera in enumerate(cameras):
         camera_from_world = invert_rigid(camera.world_from_camera)
         size_px = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
-        for place, frame in enumerate(times.tolist()):
-            seen = np.flatnonzero(visible[view, frame])
-            camera_m = transform_points(camera_from_world[frame], position_m[frame, seen])
+        for place, time in enumerate(times.tolist()):
+            seen = np.flatnonzero(visible[view, time])
+            camera_m = transform_points(camera_from_world[frames[time]], position_m[place][seen])
             share = (project(camera.intrinsics, camera_m) + 0.5) / size_px
             cell = np.clip((share * IMAGE_CELLS).astype(np.int64), 0, IMAGE_CELLS - 1)
             rows.append(seen)

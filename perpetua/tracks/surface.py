@@ -78,6 +78,10 @@ class BoundPoints:
             corner_m[group.points] = group.vertices_m[frame][group.vertex]
         return corner_m
 
+    def point_m(self, frame: int) -> Float64[np.ndarray, "N 3"]:
+        """World positions at one frame, the same bits as ``position_m`` has."""
+        return np.asarray(np.einsum("nk,nkc->nc", self.points.barycentric, self.corner_m(frame)))
+
     def position_m(self, frames: int) -> Float64[np.ndarray, "T N 3"]:
         """World positions at each frame. Points of rigid objects are bit for bit the same in all frames."""
         weight = self.points.barycentric

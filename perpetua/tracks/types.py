@@ -1,6 +1,6 @@
 """What the track stage hands on. C cameras, T frames, N tracks."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
@@ -29,9 +29,38 @@ class ViewTracks:
 
 
 @dataclass(frozen=True)
+class SightReport:
+    """How image and ray agreed about (view, frame, track) entries; where they differ the entry counts as hidden.
+
+    ``blocked_*``: the image shows the point's surface at a pixel around it, and the exact ray is stopped: by or on
+    hair; by something less than 1 cm before the point (or the point is on the back of a closed surface); at a grazing
+    angle; by a thing so thin that no pixel around shows it; by an edge. ``unseen_*``: the ray reaches the point, and
+    no pixel around shows its surface: hair; a grazing angle; nothing of its object in any pixel around (thin things);
+    otherwise, which is a rendered surface that is not where the mesh is.
+    """
+
+    entries: int = 0
+    inside: int = 0
+    visible: int = 0
+    blocked_hair: int = 0
+    blocked_coincident: int = 0
+    blocked_grazing: int = 0
+    blocked_thin: int = 0
+    blocked_edge: int = 0
+    unseen_hair: int = 0
+    unseen_grazing: int = 0
+    unseen_thin: int = 0
+    unseen_otherwise: int = 0
+
+    def __add__(self, other: "SightReport") -> "SightReport":
+        return SightReport(*(getattr(self, field.name) + getattr(other, field.name) for field in fields(self)))
+
+
+@dataclass(frozen=True)
 class SequenceTracks:
     """Everything the track stage made; ``queries_xytv`` as in the file layout."""
 
     points: PointTracks
     views: ViewTracks
     queries_xytv: Float32[np.ndarray, "N 4"]
+    report: SightReport

@@ -1,4 +1,17 @@
-"""In which views and frames a point is seen: its pixel must show its object, at its own surface's depth."""
+"""In which views and frames a point is seen: the image must show its object there, and an exact ray must reach it.
+
+Two witnesses are asked.
+
+- The image. Among the (up to) four pixel centres around the projection, one must show the point's object at the depth
+  that the plane of the point's own triangle has along that pixel's ray; so a slanted surface needs no loose tolerance,
+  and points on edges and thin things are not lost. Where the object is shown but its surface bends away from that
+  plane, the depth of the triangles near the point counts instead: those that the rays of the pixel centres meet
+  within two pixels of it.
+- The ray from the camera to the point must meet nothing opaque before it, and the point must not lie on the back of a
+  closed surface.
+
+A point is visible where both say so. Where they differ it is hidden, and counted by the reason (``SightReport``).
+"""
 
 from dataclasses import dataclass
 
@@ -11,17 +24,62 @@ from perpetua.geometry.transforms import invert_rigid, transform_points
 from perpetua.rendering.types import RenderedView
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.sides import ClosedSides
+from perpetua.tracks.sight import HairFaces, SceneSight, SightHits
 from perpetua.tracks.surface import BoundPoints
+from perpetua.tracks.types import SightReport
+
+# A ray has reached its point this far before it: what single precision leaves open.
+REACHED_M, REACHED_SHARE = 2e-4, 2e-5
+# Rendered depth is what the meshes have along the ray when it is within this.
+SAME_DEPTH_M, SAME_DEPTH_SHARE = 1e-3, 1e-4
+# What hides a point from closer than this lies on it: a shirt on skin, a rug on the floor.
+COINCIDENT_M = 0.01
+# Triangles within so many pixels of a point, measured along its surface, are its neighbours.
+NEIGHBOUR_PX = 2.0
+GRAZING_COSINE = float(np.cos(np.radians(80.0)))
+CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 
 
 @dataclass(frozen=True)
 class ViewFrame:
     """What one camera saw at one frame; ``camera_from_world`` and ``intrinsics`` as they are exported."""
 
+    frame: int
     camera_from_world: Float64[np.ndarray, "4 4"]
     intrinsics: Intrinsics
     depth_m: Float32[np.ndarray, "H W"]
     object_index: UInt16[np.ndarray, "H W"]
+
+    @property
+    def centre_m(self) -> Float64[np.ndarray, "3"]:
+        """Where the camera is in the world."""
+        return np.asarray(-self.camera_from_world[:3, :3].T @ self.camera_from_world[:3, 3])
+
+
+@dataclass(frozen=True)
+class PlacedPoints:
+    """Points at one frame: places and corners of their triangles in the world, as exported."""
+
+    point_m: Float64[np.ndarray, "N 3"]
+    corner_m: Float64[np.ndarray, "N 3 3"]
+    object_index: Int32[np.ndarray, " N"]
+    face: Int32[np.ndarray, " N"]
+    sides: ClosedSides
+
+    def take(self, chosen: Int64[np.ndarray, " M"]) -> "PlacedPoints":
+        """Some of the points."""
+        sides = ClosedSides(self.sides.closed[chosen], self.sides.box_m[chosen])
+        return PlacedPoints(
+            self.point_m[chosen], self.corner_m[chosen], self.object_index[chosen], self.face[chosen], sides
+        )
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """Where points are visible at the frames asked for, and how the witnesses agreed."""
+
+    visible: Bool[np.ndarray, "C S N"]
+    report: SightReport
 
 
 def as_exported(values: Float[np.ndarray, "*shape"]) -> Float64[np.ndarray, "*shape"]:
@@ -39,93 +97,188 @@ def exported_intrinsics(camera: CameraPath) -> Intrinsics:
 def visible_in_views(
     bound: BoundPoints,
     sides: ClosedSides,
+    sight: SceneSight,
+    hair: HairFaces,
     cameras: tuple[CameraPath, ...],
     views: tuple[RenderedView, ...],
+    frames: Int64[np.ndarray, " S"],
     config: TracksConfig,
-) -> Bool[np.ndarray, "C T N"]:
-    """Whether each point is seen by each camera at each frame; frame by frame, so that views may lie on disk."""
-    frames = len(cameras[0].world_from_camera)
-    visible = np.zeros((len(cameras), frames, len(bound.points)), bool)
-    position_m = bound.position_m(frames)
+) -> Sightings:
+    """Whether each point is seen by each camera at some frames; frame by frame, so that views may lie on disk."""
+    visible = np.zeros((len(cameras), len(frames), len(bound.points)), bool)
     intrinsics = [exported_intrinsics(camera) for camera in cameras]
     camera_from_world = [as_exported(invert_rigid(camera.world_from_camera)) for camera in cameras]
-    for frame in range(frames):
-        corner_m = as_exported(bound.corner_m(frame))
-        point_m = as_exported(position_m[frame])
+    report = SightReport()
+    for place, frame in enumerate(frames.tolist()):
+        points = bound.points
+        placed = PlacedPoints(
+            as_exported(bound.point_m(frame)),
+            as_exported(bound.corner_m(frame)),
+            points.object_index,
+            points.face,
+            sides,
+        )
         for index, view in enumerate(views):
             seen = ViewFrame(
+                frame,
                 camera_from_world[index][frame],
                 intrinsics[index],
                 np.asarray(view.depth_m[frame]),
                 np.asarray(view.object_index[frame]),
             )
-            visible[index, frame] = visible_in_frame(point_m, corner_m, bound.points.object_index, sides, seen, config)
-    return visible
+            visible[index, place], counted = visible_in_frame(placed, seen, sight, hair, config)
+            report = report + counted
+    return Sightings(visible, report)
 
 
 def visible_in_frame(
-    point_m: Float64[np.ndarray, "N 3"],
-    corner_m: Float64[np.ndarray, "N 3 3"],
-    object_index: Int32[np.ndarray, " N"],
-    sides: ClosedSides,
-    seen: ViewFrame,
-    config: TracksConfig,
-) -> Bool[np.ndarray, " N"]:
-    """Whether points are seen in one image.
-
-    The pixel that the point falls into must show the point's object, and the depth rendered at that pixel's centre
-    must be the depth that the plane of the point's own triangle has along the ray of that centre. So a slanted
-    surface needs no loose tolerance. Points on the back of a closed surface are not seen.
-    """
-    visible = np.zeros(len(point_m), bool)
-    pixel_px = project(seen.intrinsics, transform_points(seen.camera_from_world, point_m))
+    placed: PlacedPoints, seen: ViewFrame, sight: SceneSight, hair: HairFaces, config: TracksConfig
+) -> tuple[Bool[np.ndarray, " N"], SightReport]:
+    """Whether points are seen in one image, and how the two witnesses agreed."""
+    pixel_px = project(seen.intrinsics, transform_points(seen.camera_from_world, placed.point_m))
     inside = np.flatnonzero(inside_image(seen.intrinsics, pixel_px))
-    column, row = nearest_pixel(pixel_px[inside])
-    same = seen.object_index[row, column] == object_index[inside]
-    inside, column, row = inside[same], column[same], row[same]
-    plane_m, facing = _plane_depth(corner_m[inside], seen, column, row)
-    in_front_m = plane_m - seen.depth_m[row, column]
-    agrees = (
-        np.isfinite(plane_m)
-        & (plane_m > 0.0)
-        & (in_front_m <= config.tolerance_m + config.tolerance_share * plane_m)
-        & (-in_front_m <= config.behind_m + config.behind_share * plane_m)
-    )
-    visible[inside] = agrees & (facing | ~_hides_its_back(sides, seen, inside))
-    return visible
+    points = placed.take(inside)
+    around = _Around.of(pixel_px[inside], seen)
+    shows = around.valid & (around.shown == points.object_index[:, None])
+    facing, cosine = _facing(points, seen)
+    offset_m = points.point_m - seen.centre_m
+    hits = sight.first_hit(seen.frame, np.broadcast_to(seen.centre_m, offset_m.shape).copy(), offset_m)
+    length_m = np.linalg.norm(offset_m, axis=1)
+    own = (hits.object_index == points.object_index) & (hits.face == points.face)
+    reached = own | (hits.distance_m >= length_m * (1.0 - REACHED_SHARE) - REACHED_M)
+    turned = ~facing & _hides_its_back(points.sides, seen)
+    reached &= ~turned
+    agrees = (shows & _on_plane(points, around, seen, config)).any(axis=1)
+    unsure = np.flatnonzero(reached & ~agrees & shows.any(axis=1))
+    reach_m = NEIGHBOUR_PX * length_m / seen.intrinsics.fx_px / np.maximum(cosine, GRAZING_COSINE)
+    agrees[unsure] = _on_neighbours(points.point_m, reach_m, unsure, shows, around, seen, sight)
+    visible = np.zeros(len(placed.point_m), bool)
+    visible[inside] = reached & agrees
+    strands = hair.has(points.object_index, points.face) | (~reached & hair.has(hits.object_index, hits.face))
+    return visible, _count(len(visible), reached, agrees, turned, strands, cosine, length_m, hits, shows, around)
 
 
-def nearest_pixel(
-    pixel_px: Float64[np.ndarray, "N 2"],
-) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"]]:
-    """Column and row of the pixel that each projection falls into."""
-    nearest = np.floor(pixel_px + 0.5).astype(np.int64)
-    return nearest[:, 0], nearest[:, 1]
+@dataclass(frozen=True)
+class _Around:
+    """The four pixel centres around each projection, and what they show; not ``valid`` off the image."""
+
+    column: Int64[np.ndarray, "N 4"]
+    row: Int64[np.ndarray, "N 4"]
+    valid: Bool[np.ndarray, "N 4"]
+    shown: UInt16[np.ndarray, "N 4"]
+    depth_m: Float64[np.ndarray, "N 4"]
+
+    @classmethod
+    def of(cls, pixel_px: Float64[np.ndarray, "N 2"], seen: ViewFrame) -> "_Around":
+        height, width = seen.depth_m.shape
+        corner = np.floor(pixel_px).astype(np.int64)[:, None] + CORNERS
+        column, row = corner[..., 0], corner[..., 1]
+        valid = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        column, row = np.clip(column, 0, width - 1), np.clip(row, 0, height - 1)
+        return cls(column, row, valid, seen.object_index[row, column], seen.depth_m[row, column].astype(np.float64))
+
+    def rays(self, camera: Intrinsics) -> Float64[np.ndarray, "N 4 3"]:
+        """Directions of the pixel centres in the camera, with Z = 1."""
+        x, y = (self.column - camera.cx_px) / camera.fx_px, (self.row - camera.cy_px) / camera.fy_px
+        return np.stack([x, y, np.ones(x.shape)], axis=2)
 
 
-def _plane_depth(
-    corner_m: Float64[np.ndarray, "N 3 3"],
-    seen: ViewFrame,
-    column: Int64[np.ndarray, " N"],
-    row: Int64[np.ndarray, " N"],
-) -> tuple[Float64[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
-    """Depth of each triangle's plane along the ray of a pixel centre, and whether its front faces the camera."""
-    camera = seen.intrinsics
-    corner_m = transform_points(seen.camera_from_world, corner_m.reshape(-1, 3)).reshape(-1, 3, 3)
+def _facing(points: PlacedPoints, seen: ViewFrame) -> tuple[Bool[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
+    """Whether each point's triangle turns its front to the camera, and the cosine of the angle it is seen at."""
+    corner_m = points.corner_m
     normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
-    ray = np.stack(
-        [(column - camera.cx_px) / camera.fx_px, (row - camera.cy_px) / camera.fy_px, np.ones(len(column))], axis=1
-    )
-    offset = np.einsum("nc,nc->n", normal, corner_m[:, 0])
+    towards = seen.centre_m - points.point_m
+    along = np.einsum("nc,nc->n", normal, towards)
+    size = np.linalg.norm(normal, axis=1) * np.linalg.norm(towards, axis=1)
+    return along > 0.0, np.abs(along) / np.maximum(size, 1e-30)
+
+
+def _on_plane(points: PlacedPoints, around: _Around, seen: ViewFrame, config: TracksConfig) -> Bool[np.ndarray, "N 4"]:
+    """Whether rendered depth is that of each point's own plane along the rays of the pixel centres."""
+    corner_m = transform_points(seen.camera_from_world, points.corner_m.reshape(-1, 3)).reshape(-1, 3, 3)
+    normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
     with np.errstate(divide="ignore", invalid="ignore"):
-        plane_m = offset / np.einsum("nc,nc->n", normal, ray)
-    return plane_m, offset < 0.0
+        plane_m = np.einsum("nc,nc->n", normal, corner_m[:, 0])[:, None]
+        plane_m = plane_m / np.einsum("nc,nkc->nk", normal, around.rays(seen.intrinsics))
+        in_front_m = plane_m - around.depth_m
+        return np.asarray(
+            np.isfinite(plane_m)
+            & (plane_m > 0.0)
+            & (in_front_m <= config.tolerance_m + config.tolerance_share * plane_m)
+            & (-in_front_m <= config.behind_m + config.behind_share * plane_m)
+        )
 
 
-def _hides_its_back(sides: ClosedSides, seen: ViewFrame, points: Int64[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
+def _on_neighbours(
+    point_m: Float64[np.ndarray, "N 3"],
+    reach_m: Float64[np.ndarray, " N"],
+    chosen: Int64[np.ndarray, " M"],
+    shows: Bool[np.ndarray, "N 4"],
+    around: _Around,
+    seen: ViewFrame,
+    sight: SceneSight,
+) -> Bool[np.ndarray, " M"]:
+    """Whether a pixel around that shows the point's object was rendered just where its ray meets triangles near by."""
+    member, corner = np.nonzero(shows[chosen])
+    ray = around.rays(seen.intrinsics)[chosen[member], corner]
+    direction = ray @ seen.camera_from_world[:3, :3]
+    hits = sight.first_hit(seen.frame, np.broadcast_to(seen.centre_m, direction.shape).copy(), direction)
+    meshed_m = hits.distance_m / np.linalg.norm(ray, axis=1)
+    rendered_m = around.depth_m[chosen[member], corner]
+    same = np.abs(meshed_m - rendered_m) <= SAME_DEPTH_M + SAME_DEPTH_SHARE * rendered_m
+    same &= hits.object_index == around.shown[chosen[member], corner]
+    hit_m = seen.centre_m + direction * np.where(np.isfinite(meshed_m), meshed_m, 0.0)[:, None]
+    same &= np.linalg.norm(hit_m - point_m[chosen[member]], axis=1) <= reach_m[chosen[member]]
+    confirmed = np.zeros(len(chosen), bool)
+    np.logical_or.at(confirmed, member, same)
+    return confirmed
+
+
+def _hides_its_back(sides: ClosedSides, seen: ViewFrame) -> Bool[np.ndarray, " N"]:
     """Closed surfaces hide their backs from cameras outside; a closed room is seen from inside."""
-    rotation, translation = seen.camera_from_world[:3, :3], seen.camera_from_world[:3, 3]
-    camera_m = -rotation.T @ translation
-    box_m = sides.box_m[points]
-    inside = ((camera_m >= box_m[:, 0]) & (camera_m <= box_m[:, 1])).all(axis=1)
-    return np.asarray(sides.closed[points] & ~inside)
+    inside = ((seen.centre_m >= sides.box_m[:, 0]) & (seen.centre_m <= sides.box_m[:, 1])).all(axis=1)
+    return np.asarray(sides.closed & ~inside)
+
+
+def _count(
+    entries: int,
+    reached: Bool[np.ndarray, " N"],
+    agrees: Bool[np.ndarray, " N"],
+    turned: Bool[np.ndarray, " N"],
+    strands: Bool[np.ndarray, " N"],
+    cosine: Float64[np.ndarray, " N"],
+    length_m: Float64[np.ndarray, " N"],
+    hits: SightHits,
+    shows: Bool[np.ndarray, "N 4"],
+    around: _Around,
+) -> SightReport:
+    """Counts entries by what the witnesses said and, where they differ, by the first reason that applies."""
+    blocked, unseen = agrees & ~reached, reached & ~agrees
+    near = length_m - hits.distance_m < COINCIDENT_M
+    grazing = cosine < GRAZING_COSINE
+    blocker_shown = (around.valid & (around.shown == hits.object_index[:, None])).any(axis=1)
+    of_blocked = _first_reason(blocked, strands, near | turned, grazing, ~blocker_shown)
+    of_unseen = _first_reason(unseen, strands, grazing, ~shows.any(axis=1))
+    return SightReport(
+        entries=entries,
+        inside=len(reached),
+        visible=int((reached & agrees).sum()),
+        blocked_hair=of_blocked[0],
+        blocked_coincident=of_blocked[1],
+        blocked_grazing=of_blocked[2],
+        blocked_thin=of_blocked[3],
+        blocked_edge=of_blocked[4],
+        unseen_hair=of_unseen[0],
+        unseen_grazing=of_unseen[1],
+        unseen_thin=of_unseen[2],
+        unseen_otherwise=of_unseen[3],
+    )
+
+
+def _first_reason(cases: Bool[np.ndarray, " N"], *reasons: Bool[np.ndarray, " N"]) -> list[int]:
+    """How many cases have each reason and none before it; at last those without any."""
+    counts, left = [], cases
+    for reason in reasons:
+        counts.append(int((left & reason).sum()))
+        left = left & ~reason
+    return [*counts, int(left.sum())]

@@ -6,7 +6,7 @@ import trimesh
 from jaxtyping import Float64
 
 from perpetua.geometry.mesh import TriMesh, join
-from perpetua.geometry.raycast import NO_FACE, Caster
+from perpetua.geometry.raycast import NO_FACE, Caster, MovingCaster
 
 
 def _mesh(shape: trimesh.Trimesh) -> TriMesh:
@@ -99,3 +99,25 @@ def test_an_empty_mesh_blocks_nothing() -> None:
     assert caster.clear(origins, targets).all()
     assert not caster.first_hit(origins, targets).hit.any()
     assert caster.closest_distance(origins, 3.0).tolist() == [3.0]
+
+
+def test_a_moving_mesh_is_hit_where_it_is_now_as_embree_hits_it(scene: TriMesh) -> None:
+    moving = MovingCaster(scene)
+    rng = np.random.default_rng(3)
+    for shift_m in (0.0, 0.7, -1.3):
+        moved = TriMesh(scene.vertices_m * (1.0 + 0.1 * shift_m) + shift_m, scene.faces)
+        moving.move_to(moved.vertices_m)
+        # From inside and from outside, some of them past the mesh.
+        origins, directions = 1.4 * _points(800) + shift_m, rng.normal(size=(800, 3))
+        wanted, found = Caster(moved).first_hit(origins, directions), moving.first_hit(origins, directions)
+        assert 0.3 < wanted.hit.mean() < 0.9
+        np.testing.assert_array_equal(found.hit, wanted.hit)
+        np.testing.assert_array_equal(found.face, wanted.face)
+        np.testing.assert_allclose(found.distance_m, wanted.distance_m, rtol=1e-12)
+        np.testing.assert_allclose(found.barycentric, wanted.barycentric, atol=2e-4)
+
+
+def test_a_moving_mesh_that_no_ray_comes_near() -> None:
+    ball = MovingCaster(_mesh(trimesh.creation.icosphere(2, 1.0)))
+    away = ball.first_hit(np.array([[0.0, 0, 5], [0.0, 3, 5]]), np.array([[0.0, 0, 2], [0.0, 0, -2]]))
+    assert not away.hit.any() and np.isinf(away.distance_m).all()

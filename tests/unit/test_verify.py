@@ -239,7 +239,7 @@ FAULTS: dict[str, tuple[Fault, str, str]] = {
         "depth shows its surface",
     ),
     "one visibility bit flipped": (
-        change("1/visibility.npy", lambda a: a ^ np.eye(1, a.size, 500, dtype=bool).reshape(a.shape)),
+        change("1/visibility.npy", lambda a: a ^ np.eye(1, a.size, 507, dtype=bool).reshape(a.shape)),
         "query draw",
         "the draw gives",
     ),
