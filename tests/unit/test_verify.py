@@ -238,8 +238,8 @@ FAULTS: dict[str, tuple[Fault, str, str]] = {
         "hidden for a reason",
         "depth shows its surface",
     ),
-    "one visibility bit flipped": (
-        change("1/visibility.npy", lambda a: a ^ np.eye(1, a.size, 507, dtype=bool).reshape(a.shape)),
+    "one visibility bit flipped that a query hangs on": (
+        change("1/visibility.npy", lambda a: a ^ np.eye(1, a.size, 511, dtype=bool).reshape(a.shape)),
         "query draw",
         "the draw gives",
     ),
