@@ -1,11 +1,20 @@
 """Bodies drawn for a room, and put in motion."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from perpetua.actors.bodies import BODY_MODELS
 from perpetua.actors.bodies.source import Body
 from perpetua.actors.config import ActorsConfig
-from perpetua.actors.types import ActorMesh, BodyMotion
+from perpetua.actors.types import BODY_JOINTS, ActorMesh, BodyMotion, Skeleton
 from perpetua.errors import ActorError
 from perpetua.seeding import StageSeed
+
+# What is sat on: so far behind the hip joints, along this share of the thighs, and so far to either side.
+_BUTTOCK_M, _THIGH_SHARE, _HALF_WIDTH_M = 0.08, 0.7, 0.22
+# Loose cloth that hangs lower than flesh can be is pressed flat.
+_SEAT_LIMITS_M = (0.06, 0.115)
 
 
 def draw_bodies(config: ActorsConfig, seed: StageSeed) -> tuple[Body, ...]:
@@ -17,6 +26,27 @@ def draw_bodies(config: ActorsConfig, seed: StageSeed) -> tuple[Body, ...]:
     """
     model = BODY_MODELS[config.body]()
     return tuple(model.draw(actor, config, seed) for actor in range(config.count))
+
+
+def measured_skeletons(bodies: tuple[Body, ...]) -> tuple[Skeleton, ...]:
+    """The bones of bodies, with what flesh and clothes are between the hip joints and a seat, measured on each."""
+    return tuple(replace(body.skeleton, seat_m=_seat_m(body)) for body in bodies)
+
+
+def _seat_m(body: Body) -> float:
+    """How far below its hip joints a body ends with its thighs level."""
+    joint_m = body.skeleton.joint_m
+    hip, knee = BODY_JOINTS.index("left_hip"), BODY_JOINTS.index("left_knee")
+    rotation = np.tile(np.eye(3), (1, len(BODY_JOINTS), 1, 1))
+    # A thigh that hangs at rest points to +X when it is pitched up by a quarter turn.
+    rotation[:, [hip, BODY_JOINTS.index("right_hip")]] = [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
+    posed = body.pose(BodyMotion(0, 1.0, rotation, joint_m[:1], np.zeros((1, 4), bool)))[0].astype(np.float64)
+    from_hip_m = posed - joint_m[hip]
+    thigh_m = float(np.linalg.norm(joint_m[knee] - joint_m[hip]))
+    under = (from_hip_m[:, 0] > -_BUTTOCK_M) & (from_hip_m[:, 0] < _THIGH_SHARE * thigh_m)
+    near = np.abs(posed[:, 1]) < _HALF_WIDTH_M
+    # Shins and feet, which hang at the knees, are not sat on.
+    return float(np.clip(-np.percentile(from_hip_m[under & near, 2], 0.5), *_SEAT_LIMITS_M))
 
 
 def assemble_actors(

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from motion_samples import sample_skeleton
+from motion_samples import empty_room, sample_skeleton
 
 from perpetua.actors.motion.feet import FootShape, foot_track
 from perpetua.actors.motion.footsteps import Plant, step_timing
+from perpetua.actors.motion.ground import Ground
 from perpetua.actors.motion.kinematics import contact_positions, joint_positions, solve_two_bones
 from perpetua.actors.types import BodyMotion
 
@@ -65,7 +66,7 @@ def test_a_foot_moves_without_jumps_and_its_contacts_do_not_move(stride_m: float
         Plant(np.array([2 * stride_m, 0.1, 0.0]), 0.2, 2.0, np.inf, np.zeros(2)),
     )
     time_s = np.linspace(-0.5, 2.5, 6001)
-    track = foot_track(plants, shape, 0.02, time_s)
+    track = foot_track(plants, shape, 0.02, Ground(empty_room()), time_s)
     velocity_mps = np.diff(track.ankle_m, axis=0) / (time_s[1] - time_s[0])
     assert np.linalg.norm(velocity_mps, axis=1).max() < 8.0
     assert np.abs(np.diff(track.pitch_rad)).max() / (time_s[1] - time_s[0]) < 12.0

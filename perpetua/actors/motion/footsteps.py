@@ -147,7 +147,9 @@ class FootstepPlanner:
     def _next_lift_s(self, plant: Plant, lift_s: float, timing: StepTiming) -> float:
         """When the standing foot lifts: half a cycle after the other, sooner where the body would leave it behind."""
         runs = timing.support_s < 0.5 * timing.cycle_s
-        earliest_s = plant.land_s + _LEAST_SUPPORT_S if runs else lift_s + timing.swing_s + _LEAST_DOUBLE_SUPPORT_S
+        earliest_s = lift_s + timing.swing_s + _LEAST_DOUBLE_SUPPORT_S
+        if runs:
+            earliest_s = max(plant.land_s + _LEAST_SUPPORT_S, lift_s + 0.25 * timing.cycle_s)
         latest_s = max(lift_s + 0.5 * timing.cycle_s, earliest_s)
         moments_s = np.linspace(earliest_s, latest_s, 8)
         away_m = np.linalg.norm(self._path.position_m(moments_s)[:, :2] - plant.position_m[:2], axis=1)

@@ -52,4 +52,4 @@ def frames_along(
 def smoothstep(share: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
     """From 0 to 1 without corners, and constant beyond."""
     inside = np.clip(share, 0.0, 1.0)
-    return np.asarray(inside**3 * (10.0 - 15.0 * inside + 6.0 * inside**2))
+    return np.clip(inside**3 * (10.0 - 15.0 * inside + 6.0 * inside**2), 0.0, 1.0)

@@ -172,7 +172,7 @@ ACTIONS: dict[str, Action] = {
         move=Move(head_pitch=0.2, head_tilt=-0.1), hold_s=(2.0, 3.5), pause_s=(3.0, 6.0), rise_s=0.8,
     ),
     "touch the chin": Action(
-        "think ponder touch stroke rub wonder", "chin beard thoughtful deep hard face",
+        "think ponder touch stroke rub wonder", "think ponder wonder chin beard face",
         HandPose((0.34, -0.26, 0.03), (0.1, 0.45, -1.0), (-0.9, -0.3, 0.2), 0.15, "fist"),
         move=Move(head_pitch=0.12, head_tilt=0.06), hold_s=(3.0, 6.0), pause_s=(2.0, 4.0), rise_s=0.8,
     ),
