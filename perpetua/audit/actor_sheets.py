@@ -82,7 +82,9 @@ def _row(body: Body, seed: StageSeed, actor: int, config: Config, device: str) -
     near_m = _eye_level_m(body)
     cameras = (_row_camera(len(cells)), _near_camera(len(cells), near_m))
     # Plain sampling of few rays costs less here than denoising does.
-    settings = config.render.model_copy(update={"samples": SAMPLES, "max_bounces": 1, "denoise": False})
+    settings = config.render.model_copy(
+        update={"samples": SAMPLES, "max_bounces": 1, "denoise": False, "white_balance": 0.0}
+    )
     with tempfile.TemporaryDirectory() as folder:
         views = render_views(
             studio(), (_lined_up(body, cells),), cameras, settings, device, Path(folder), lambda *_: None
@@ -201,5 +203,5 @@ def studio() -> Room:
         SceneObject(1, "floor", "floor", TriMesh(floor, faces), grey, True, True),
         SceneObject(2, "wall", "wall", TriMesh(wall, faces), grey, False, True),
     )
-    lamp = AreaLight((9.0, -7.0, 10.0), (-0.63, 0.45, -0.63), (3.0, 3.0), 5000.0, (1.0, 0.95, 0.88))
+    lamp = AreaLight((9.0, -7.0, 10.0), (-0.63, 0.45, -0.63), (3.0, 3.0), 9000.0, (1.0, 0.84, 0.66))
     return Room("studio", "studio", floor[:, :2], 12.0, things, (lamp,), None)

@@ -14,9 +14,9 @@ from perpetua.seeding import StageSeed
 # Linear RGB of skin from light to deep, along which each ancestry covers a range.
 _TONES = np.array(
     [
-        [0.74, 0.50, 0.40],
-        [0.62, 0.39, 0.29],
-        [0.48, 0.28, 0.19],
+        [0.60, 0.40, 0.31],
+        [0.53, 0.33, 0.24],
+        [0.43, 0.25, 0.17],
         [0.33, 0.18, 0.11],
         [0.18, 0.09, 0.055],
         [0.085, 0.042, 0.027],
@@ -37,8 +37,8 @@ _IRIS = {
     "blue": (0.10, 0.22, 0.36),
     "green": (0.12, 0.19, 0.10),
 }
-_MEN_HAIR = ("short", "side-parted", "swept-back", "cropped", "short", "curly")
-_WOMEN_HAIR = ("chin-length", "long", "tied-up", "long", "chin-length", "curly", "short")
+_MEN_HAIR = ("short", "side-parted", "swept-back", "buzzed", "short", "curly", "side-parted")
+_WOMEN_HAIR = ("bob", "long", "tied-up", "wavy", "ponytail", "curly", "long", "short")
 _STATURE_M = {False: (1.77, 0.065), True: (1.64, 0.06)}
 
 
@@ -121,7 +121,7 @@ def draw_person(actor: int, config: ActorsConfig, seed: StageSeed) -> Person:
     style_names = _WOMEN_HAIR if female else _MEN_HAIR
     style = STYLES[style_names[int(rng.integers(len(style_names)))]]
     if ancestry == "african" and rng.random() < 0.5:
-        style = STYLES["afro" if female or rng.random() < 0.4 else "cropped"]
+        style = STYLES["afro" if female or rng.random() < 0.3 else "buzzed"]
     outfit = draw_outfit(actor, female, seed)
     words = (
         f"{_words(female, age_years, weight, muscle, stature_m)}, {style.name} {hair_name} hair, wearing {outfit.words}"

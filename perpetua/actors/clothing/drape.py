@@ -11,13 +11,19 @@ from perpetua.actors.clothing.surface import averaging, border_edges, positive, 
 _NORMAL_PASSES = 12
 
 
+_PASSES = 40
+
+
 @dataclass(frozen=True)
 class Drape:
-    """Per vertex, ``gap_m`` is the least distance from the body, ``hold`` how strongly cloth keeps its ease."""
+    """Per vertex, ``gap_m`` is the least distance from the body, ``hold`` how strongly cloth keeps its ease.
+
+    ``fold_m`` is how far folds stand out.
+    """
 
     gap_m: Float64[np.ndarray, " P"]
-    passes: int
     hold: Float64[np.ndarray, " P"]
+    fold_m: Float64[np.ndarray, " P"]
 
 
 def smooth_normals(surface: Surface) -> Float64[np.ndarray, "P 3"]:
@@ -30,35 +36,30 @@ def smooth_normals(surface: Surface) -> Float64[np.ndarray, "P 3"]:
 
 
 def draped(surface: Surface, ease_m: Float64[np.ndarray, " P"], how: Drape) -> Float64[np.ndarray, "P 3"]:
-    """Where the cloth cut from this body surface comes to lie.
+    """Where the cloth cut from this body surface comes to lie, folds included.
 
     Repeated averaging pulls the cloth straight across hollows (the small of the back, between the legs); wherever
-    that brings it nearer to the body than ``gap_m`` the body pushes it out again.
+    that, or a fold, brings it nearer to the body than ``gap_m`` the body pushes it out again.
     """
     mean = averaging(surface.faces, len(surface.vertices_m))
     normal = smooth_normals(surface)
     wanted = surface.vertices_m + ease_m[:, None] * normal
-    cloth = wanted.copy()
+    cloth = wanted
     hold = how.hold[:, None]
-    for _ in range(how.passes):
-        cloth = np.asarray((1.0 - hold) * (0.4 * cloth + 0.6 * (mean @ cloth)) + hold * wanted)
-        gap = np.einsum("pa,pa->p", cloth - surface.vertices_m, normal)
-        cloth += np.maximum(how.gap_m - gap, 0.0)[:, None] * normal
-    return cloth
+    for _ in range(_PASSES):
+        cloth = (1.0 - hold) * (0.4 * cloth + 0.6 * (mean @ cloth)) + hold * wanted
+        cloth = _pushed_out(cloth, surface.vertices_m, normal, how.gap_m)
+    return _pushed_out(cloth + how.fold_m[:, None] * normal, surface.vertices_m, normal, how.gap_m)
 
 
-def wrinkles(
-    template_m: Float64[np.ndarray, "P 3"], across: Float64[np.ndarray, "3"], rng: np.random.Generator
-) -> Float64[np.ndarray, " P"]:
-    """Soft folds in [-1, 1] that run mostly square to ``across``."""
-    total = np.zeros(len(template_m))
-    for _ in range(5):
-        direction = across + 0.45 * rng.standard_normal(3)
-        direction /= np.linalg.norm(direction)
-        bend = template_m @ rng.standard_normal(3)
-        wave_m = rng.uniform(0.055, 0.12)
-        total += np.sin(2.0 * np.pi * (template_m @ direction) / wave_m + 6.0 * bend + rng.uniform(0.0, 2.0 * np.pi))
-    return total / 5.0
+def _pushed_out(
+    cloth_m: Float64[np.ndarray, "P 3"],
+    body_m: Float64[np.ndarray, "P 3"],
+    normal: Float64[np.ndarray, "P 3"],
+    gap_m: Float64[np.ndarray, " P"],
+) -> Float64[np.ndarray, "P 3"]:
+    gap = np.einsum("pa,pa->p", cloth_m - body_m, normal)
+    return np.asarray(cloth_m + np.maximum(gap_m - gap, 0.0)[:, None] * normal)
 
 
 def hemmed(surface: Surface, field_m: Float64[np.ndarray, " P"], width_m: float, thickness_m: float) -> Surface:

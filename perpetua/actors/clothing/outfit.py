@@ -7,7 +7,7 @@ from jaxtyping import Bool
 
 from perpetua.actors.bodies.makehuman import base_mesh
 from perpetua.actors.bodies.rig import base_weights
-from perpetua.actors.clothing.fabrics import weave
+from perpetua.actors.clothing.fabrics import Fabric, weave
 from perpetua.actors.clothing.patterns import (
     SkirtPattern,
     TopPattern,
@@ -19,6 +19,7 @@ from perpetua.actors.clothing.patterns import (
 )
 from perpetua.actors.clothing.piece import Piece
 from perpetua.actors.clothing.shoes import Footing, ShoePattern, make_shoes, shoe_field_m
+from perpetua.actors.clothing.socks import make_socks, sock_field_m
 from perpetua.actors.clothing.tailor import sew_skirt, sew_top, sew_trousers
 from perpetua.actors.clothing.wearer import Wearer
 from perpetua.seeding import StageSeed
@@ -49,13 +50,29 @@ DYES: dict[str, Colour] = {
 _TOP_DYES = ("white", "teal", "red", "navy", "mustard", "green", "pink", "sky", "burgundy", "orange", "purple", "grey")
 _LEG_DYES = ("navy", "charcoal", "beige", "olive", "grey", "brown")
 _TOPS: dict[str, TopPattern] = {
-    "T-shirt": TopPattern(0.155, 0.010, 0.055, False, "band", 0.013, 0.0025),
-    "V-neck T-shirt": TopPattern(0.145, 0.015, 0.110, True, "none", 0.012, 0.0025),
-    "polo shirt": TopPattern(0.160, 0.005, 0.060, False, "polo", 0.013, 0.0025),
-    "shirt": TopPattern(0.462, -0.010, 0.058, False, "shirt", 0.015, 0.0020),
-    "jumper": TopPattern(0.470, 0.025, 0.050, False, "band", 0.019, 0.0050),
+    "T-shirt": TopPattern(0.160, 0.010, 0.055, False, "band", 0.013, 0.0025),
+    "V-neck T-shirt": TopPattern(0.150, 0.015, 0.110, True, "none", 0.012, 0.0025),
+    "polo shirt": TopPattern(0.165, 0.005, 0.060, False, "polo", 0.013, 0.0025, buttons_to_z_m=0.385),
+    "shirt": TopPattern(0.462, -0.010, 0.058, False, "shirt", 0.015, 0.0020, 0.009, 0.0, 0.000, True),
+    "jumper": TopPattern(0.470, 0.025, 0.050, False, "band", 0.019, 0.0050, 0.010),
     "long-sleeved top": TopPattern(0.455, 0.015, 0.070, False, "band", 0.012, 0.0025),
 }
+_JACKETS: dict[str, TopPattern] = {
+    "jacket": TopPattern(0.470, -0.030, 0.075, False, "none", 0.024, 0.0060, 0.009, 0.040),
+    "cardigan": TopPattern(0.468, -0.050, 0.150, True, "none", 0.022, 0.0050, 0.009, 0.028),
+}
+# What a jacket may be worn over, and how often one is.
+_UNDER_JACKETS, _JACKET_SHARE = ("T-shirt", "V-neck T-shirt"), 0.6
+_JACKET_FABRICS = {"jacket": ("plain", "denim", "heather", "checks"), "cardigan": ("knit",)}
+_JACKET_DYES = ("navy", "charcoal", "olive", "beige", "brown", "grey", "burgundy")
+_BODICES = (
+    TopPattern(0.110, 0.085, 0.075, False, "none", 0.007, 0.0025, 0.003),
+    TopPattern(0.145, 0.085, 0.115, True, "none", 0.007, 0.0025, 0.003),
+    TopPattern(0.400, 0.085, 0.060, False, "none", 0.007, 0.0025, 0.004),
+)
+_DRESS_SKIRT = SkirtPattern(0.110, -0.400, 0.004, 0.003)
+_DRESS_FABRICS = ("print", "dots", "plain", "checks", "stripes")
+_DRESS_SHARE = 0.3
 _TOP_FABRICS: dict[str, tuple[str, ...]] = {
     "T-shirt": ("stripes", "plain", "print", "heather"),
     "V-neck T-shirt": ("plain", "stripes", "dots", "print"),
@@ -65,10 +82,10 @@ _TOP_FABRICS: dict[str, tuple[str, ...]] = {
     "long-sleeved top": ("stripes", "heather", "print"),
 }
 _BOTTOMS: dict[str, TrouserPattern | SkirtPattern] = {
-    "jeans": TrouserPattern(0.125, 0.812, 0.008, 0.015, 0.003),
-    "slim trousers": TrouserPattern(0.130, 0.795, 0.007, 0.011, 0.003),
-    "loose trousers": TrouserPattern(0.130, 0.812, 0.011, 0.026, 0.003),
-    "shorts": TrouserPattern(0.125, 0.375, 0.011, 0.026, 0.003),
+    "jeans": TrouserPattern(0.125, 0.842, 0.009, 0.018, 0.003, 0.0055, True),
+    "slim trousers": TrouserPattern(0.130, 0.836, 0.008, 0.014, 0.003, 0.0045, True),
+    "loose trousers": TrouserPattern(0.130, 0.845, 0.012, 0.026, 0.003, 0.0075),
+    "shorts": TrouserPattern(0.125, 0.375, 0.012, 0.028, 0.003, 0.006, True),
     "skirt": SkirtPattern(0.090, -0.380, 0.003, 0.003),
 }
 _BOTTOM_FABRICS: dict[str, tuple[str, ...]] = {
@@ -81,6 +98,9 @@ _BOTTOM_FABRICS: dict[str, tuple[str, ...]] = {
 _MEN_WEAR = ("jeans", "slim trousers", "jeans", "loose trousers", "shorts", "loose trousers")
 _WOMEN_WEAR = ("jeans", "slim trousers", "skirt", "jeans", "loose trousers", "skirt", "shorts")
 _SHOES = ("trainers", "runners", "leather shoes")
+# How far socks reach above the floor under trousers, and with bare legs.
+_LONG_SOCK_M, _SHORT_SOCK_M = 0.20, 0.125
+_SOCK_DYES = ("white", "grey", "charcoal", "navy", "white")
 
 
 @dataclass(frozen=True)
@@ -94,13 +114,17 @@ class Cloth:
 
 @dataclass(frozen=True)
 class Outfit:
-    """A plan of clothes; ``words`` describe them."""
+    """A plan of clothes; ``words`` describe them. ``sock_m`` is the height of socks, 0 for none."""
 
     top: TopPattern
     top_cloth: Cloth
     bottom: TrouserPattern | SkirtPattern
     bottom_cloth: Cloth
+    jacket: TopPattern | None
+    jacket_cloth: Cloth
     shoes: ShoePattern
+    sock_m: float
+    sock_cloth: Cloth
     words: str
     actor: int
 
@@ -136,33 +160,74 @@ def draw_outfit(actor: int, female: bool, seed: StageSeed) -> Outfit:
     top = tops[int(room.permutation(len(tops))[actor % len(tops)])]
     dye = _TOP_DYES[int(room.permutation(len(_TOP_DYES))[actor % len(_TOP_DYES)])]
     other = _pick(tuple(name for name in _TOP_DYES if name != dye), rng)
-    top_cloth = Cloth(_pick(_TOP_FABRICS[top], rng), dye, other)
-    legs = _pick(_WOMEN_WEAR if female else _MEN_WEAR, rng)
-    leg_cloth = Cloth(_pick(_BOTTOM_FABRICS[legs], rng), "navy" if legs == "jeans" else _pick(_LEG_DYES, rng), "white")
     shoes = _pick(_SHOES, rng)
-    below = f"a {leg_cloth.base} skirt" if legs == "skirt" else f"{leg_cloth.base} {legs}"
-    words = f"a {dye} {top_cloth.fabric} {top}, {below} and {shoes}"
-    words = words.replace("knit jumper", "knitted jumper").replace("print ", "printed ").replace("stripes ", "striped ")
-    words = words.replace("checks ", "checked ").replace("dots ", "dotted ")
-    return Outfit(_TOPS[top], top_cloth, _BOTTOMS[legs], leg_cloth, _draw_shoes(shoes, rng), words, actor)
+    jacket = _pick(tuple(_JACKETS), rng)
+    jacket_cloth = Cloth(_pick(_JACKET_FABRICS[jacket], rng), _pick(_JACKET_DYES, rng), "beige")
+    lower: TrouserPattern | SkirtPattern
+    wears_jacket = top in _UNDER_JACKETS and rng.random() < _JACKET_SHARE
+    over = f" under a {jacket_cloth.base} {jacket_cloth.fabric} {jacket}" if wears_jacket else ""
+    if female and rng.random() < _DRESS_SHARE:
+        cloth = Cloth(_pick(_DRESS_FABRICS, rng), dye, other)
+        bodice = _BODICES[int(rng.integers(len(_BODICES)))]
+        upper, lower, lower_cloth = bodice, _DRESS_SKIRT, cloth
+        words = f"a {dye} {cloth.fabric} dress{over}"
+    else:
+        cloth = Cloth(_pick(_TOP_FABRICS[top], rng), dye, other)
+        legs = _pick(_WOMEN_WEAR if female else _MEN_WEAR, rng)
+        colour = "navy" if legs == "jeans" else _pick(_LEG_DYES, rng)
+        lower_cloth = Cloth(_pick(_BOTTOM_FABRICS[legs], rng), colour, "white")
+        upper, lower = _TOPS[top], _BOTTOMS[legs]
+        below = f"a {colour} skirt" if legs == "skirt" else f"{colour} {legs}"
+        words = f"a {dye} {cloth.fabric} {top}{over}, {below}"
+    bare = isinstance(lower, SkirtPattern)
+    sock_m = 0.0 if bare else _SHORT_SOCK_M if lower is _BOTTOMS["shorts"] else _LONG_SOCK_M
+    return Outfit(
+        upper,
+        cloth,
+        lower,
+        lower_cloth,
+        _JACKETS[jacket] if wears_jacket else None,
+        jacket_cloth,
+        _draw_shoes(shoes, rng),
+        sock_m,
+        Cloth("knit", _pick(_SOCK_DYES, rng), "grey"),
+        _in_plain_words(f"{words} and {shoes}"),
+        actor,
+    )
+
+
+def _in_plain_words(words: str) -> str:
+    """Kinds of cloth as one says them of clothes."""
+    said = {"knit": "knitted", "print": "printed", "stripes": "striped", "checks": "checked", "dots": "dotted"}
+    plain = " ".join(said.get(word, word) for word in words.split(" "))
+    return plain.replace("a olive", "an olive").replace("a orange", "an orange")
 
 
 def dress(wearer: Wearer, outfit: Outfit, seed: StageSeed) -> Dressed:
     """Makes the clothes of an outfit on a body."""
     rng = seed.stream("sewing", outfit.actor)
-    cloths = [
-        weave(cloth.fabric, DYES[cloth.base], DYES[cloth.other], rng)
-        for cloth in (outfit.top_cloth, outfit.bottom_cloth)
-    ]
+    top_fabric = _woven(outfit.top_cloth, rng)
+    one_cloth = outfit.bottom_cloth == outfit.top_cloth
+    bottom_fabric = top_fabric if one_cloth else _woven(outfit.bottom_cloth, rng)
     template_m, weights = base_mesh().vertices_m, base_weights()
     shoes, footing = make_shoes(wearer, outfit.shoes, rng)
-    top = sew_top(wearer, outfit.top, cloths[0], rng)
+    pieces = [sew_top(wearer, outfit.top, top_fabric, rng, outfit.jacket)]
     hidden = covered_by(top_field_m(outfit.top, template_m, weights))
     if isinstance(outfit.bottom, SkirtPattern):
-        bottom = sew_skirt(wearer, outfit.bottom, outfit.top, cloths[1], rng)
+        pieces.append(sew_skirt(wearer, outfit.bottom, outfit.top, bottom_fabric, rng))
         hidden |= covered_by(skirt_field_m(outfit.bottom, template_m, weights))
     else:
-        bottom = sew_trousers(wearer, outfit.bottom, outfit.top, cloths[1], rng)
+        pieces.append(sew_trousers(wearer, outfit.bottom, outfit.top, bottom_fabric, rng))
         hidden |= covered_by(trouser_field_m(outfit.bottom, template_m, weights))
+    if outfit.jacket is not None:
+        pieces.append(sew_top(wearer, outfit.jacket, _woven(outfit.jacket_cloth, rng), rng))
+        hidden |= covered_by(top_field_m(outfit.jacket, template_m, weights))
+    if outfit.sock_m > 0.0:
+        pieces.append(make_socks(wearer, outfit.sock_m, _woven(outfit.sock_cloth, rng)))
+        hidden |= sock_field_m(outfit.sock_m, template_m) > 0.01
     hidden |= shoe_field_m(outfit.shoes, template_m) > 0.02
-    return Dressed((top, bottom, shoes), hidden, footing)
+    return Dressed((*pieces, shoes), hidden, footing)
+
+
+def _woven(cloth: Cloth, rng: np.random.Generator) -> Fabric:
+    return weave(cloth.fabric, DYES[cloth.base], DYES[cloth.other], rng)

@@ -9,13 +9,15 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from perpetua.actors.bodies.rig import joint_index
-from perpetua.actors.clothing.wearer import along_arm_m, along_leg_m, arm_share
+from perpetua.actors.clothing.wearer import along_arm_m, along_leg_m, arm_share, template_joints
 
 # Skin is hidden where cloth covers it by more than this: nobody looks further up a sleeve.
 COVERED_MARGIN_M = 0.030
 _FAR_M = 1.0
 _NECK_HALF_WIDTH_M = 0.078
 _NECK_Z_M = 0.600
+_FRONT_X_M = 0.03
+_LOWEST_HEM_Z_M = -0.785
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,8 @@ class TopPattern:
     """A top: length of the sleeves from the shoulder, height of the hem, neckline, and how loose it hangs.
 
     ``neck_drop_m`` is the neckline's depth in front, ``vee`` makes it pointed; ``collar`` is a key of the collars.
+    ``fold_m`` is the depth of folds; ``open_m`` half the width of an open front, 0 where it is closed;
+    ``buttons_to_z_m`` gives it a placket with buttons down to that height, ``pocket`` a pocket on the chest.
     """
 
     sleeve_m: float
@@ -32,17 +36,26 @@ class TopPattern:
     collar: str
     ease_m: float
     thickness_m: float
+    fold_m: float = 0.009
+    open_m: float = 0.0
+    buttons_to_z_m: float | None = None
+    pocket: bool = False
 
 
 @dataclass(frozen=True)
 class TrouserPattern:
-    """Trousers: height of the waistband, length of the legs from the hip, and how loose they are at hip and hem."""
+    """Trousers: height of the waistband, length of the legs from the hip, and how loose they are at hip and hem.
+
+    ``fold_m`` is the depth of folds; ``pockets`` are sewn on behind.
+    """
 
     waist_z_m: float
     leg_m: float
     hip_ease_m: float
     leg_ease_m: float
     thickness_m: float
+    fold_m: float = 0.006
+    pockets: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,6 +77,8 @@ def top_field_m(
     hem = np.where(arm, _FAR_M, template_m[:, 2] - pattern.hem_z_m)
     head = weights[:, joint_index("head")] > 0.5
     inside = np.minimum(np.minimum(sleeve, hem), _neckline_field_m(pattern, template_m))
+    if pattern.open_m > 0.0:
+        inside = np.minimum(inside, np.where(arm, _FAR_M, _open_front_m(pattern.open_m, template_m)))
     return np.where(head, -_FAR_M, inside)
 
 
@@ -79,11 +94,20 @@ def _neckline_field_m(pattern: TopPattern, template_m: Float64[np.ndarray, "P 3"
     return np.asarray((opening - 1.0) * _NECK_HALF_WIDTH_M)
 
 
+def _open_front_m(open_m: float, template_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, " P"]:
+    """Metres beside an opening down the front that widens towards the hem and the neck."""
+    half_m = open_m * np.interp(template_m[:, 2], [0.0, 0.15, 0.30, 0.50], [1.5, 1.0, 1.0, 1.6])
+    return np.where(template_m[:, 0] > _FRONT_X_M, np.abs(template_m[:, 1]) - half_m, _FAR_M)
+
+
 def trouser_field_m(
     pattern: TrouserPattern, template_m: Float64[np.ndarray, "P 3"], weights: Float64[np.ndarray, "P J"]
 ) -> Float64[np.ndarray, " P"]:
     """Metres inside the trousers' cut lines, on the base mesh; negative outside."""
     inside = np.minimum(pattern.waist_z_m - template_m[:, 2], pattern.leg_m - along_leg_m(template_m))
+    # Long legs end above the floor, in front above the instep.
+    ahead_m = np.maximum(template_m[:, 0] - template_joints()[joint_index("left_ankle"), 0] - 0.02, 0.0)
+    inside = np.minimum(inside, template_m[:, 2] - _LOWEST_HEM_Z_M - 0.55 * ahead_m)
     return np.where(arm_share(weights) > 0.3, -_FAR_M, inside)
 
 

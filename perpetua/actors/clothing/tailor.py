@@ -3,13 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 from scipy.spatial import cKDTree
 
 from perpetua.actors.bodies.rig import joint_index
 from perpetua.actors.clothing.collar import collar
-from perpetua.actors.clothing.drape import Drape, draped, hemmed, smooth_normals, wrinkles
+from perpetua.actors.clothing.details import back_pockets_m, buttons, chest_pocket_m, joined, patch, placket
+from perpetua.actors.clothing.drape import Drape, draped, hemmed, smooth_normals
 from perpetua.actors.clothing.fabrics import Fabric
+from perpetua.actors.clothing.folds import skirt_folds, top_folds, trouser_folds
 from perpetua.actors.clothing.patterns import (
     SkirtPattern,
     TopPattern,
@@ -33,6 +35,8 @@ _SKIRT_RADIUS_M = 0.19
 # What a top covers by more than this is left out of trousers: it cannot show, and must not poke through.
 _TUCKED_M = 0.025
 
+
+_BUTTON = Material("button", (0.6, 0.58, 0.52), roughness=0.35, image=np.full((8, 8, 3), (205, 200, 190), np.uint8))
 
 # Cuffs do not turn with the hand, and a hem hangs from the waist more than it follows the thighs.
 _TOP_MOVES = {"wrist": ("forearm", 0.9), "hip": ("pelvis", 0.5)}
@@ -69,14 +73,6 @@ def _edged(surface: Surface, field_m: Float64[np.ndarray, " P"]) -> Float64[np.n
     return edged
 
 
-def _folded(
-    surface: Surface, depth_m: Float64[np.ndarray, " P"], across: tuple[float, float, float], rng: np.random.Generator
-) -> Surface:
-    """The cloth with folds of the given depth that run square to ``across``."""
-    height_m = wrinkles(surface.template_m, np.array(across), rng) * depth_m
-    return replace(surface, vertices_m=surface.vertices_m + height_m[:, None] * smooth_normals(surface))
-
-
 def _top_ease_m(pattern: TopPattern, surface: Surface) -> Float64[np.ndarray, " P"]:
     """Snug on the shoulders, looser below the chest, wider towards the ends of short sleeves."""
     height = surface.template_m[:, 2]
@@ -88,8 +84,18 @@ def _top_ease_m(pattern: TopPattern, surface: Surface) -> Float64[np.ndarray, " 
     return pattern.ease_m * ((1.0 - arm) * body + arm * sleeve)
 
 
-def sew_top(wearer: Wearer, pattern: TopPattern, fabric: Fabric, rng: np.random.Generator) -> Piece:
-    """A top on this body."""
+def _top_hold(pattern: TopPattern, surface: Surface, field_m: Float64[np.ndarray, " P"]) -> Float64[np.ndarray, " P"]:
+    """Tops hang from the shoulders; ribbed hems and cuffs stay where they are, others hardly."""
+    shoulders = np.interp(surface.template_m[:, 2], [0.38, 0.50], [0.06, 0.30])
+    cuff = np.clip(1.0 - field_m / 0.04, 0.0, 1.0) * (pattern.sleeve_m > _SHORT_SLEEVE_M) * arm_share(surface.weights)
+    band = np.clip(1.0 - field_m / 0.04, 0.0, 1.0) * (1.0 - arm_share(surface.weights)) * (pattern.thickness_m > 0.004)
+    return np.maximum(shoulders, 0.25 * np.maximum(cuff, band))
+
+
+def sew_top(
+    wearer: Wearer, pattern: TopPattern, fabric: Fabric, rng: np.random.Generator, over: TopPattern | None = None
+) -> Piece:
+    """A top on this body, without what another one worn over it hides."""
     tights = refined_group(wearer, "helper-tights")
     cut, _ = positive(tights, top_field_m(pattern, tights.template_m, tights.weights))
     # Armholes, sides and shoulders are seams: cloth is cut there, so that each panel has its own grain.
@@ -97,18 +103,33 @@ def sew_top(wearer: Wearer, pattern: TopPattern, fabric: Fabric, rng: np.random.
     seamed, _ = split(cut, front_m(cut.template_m))
     field_m = _edged(seamed, top_field_m(pattern, seamed.template_m, seamed.weights))
     ease_m = _top_ease_m(pattern, seamed)
-    hold = np.interp(seamed.template_m[:, 2], [0.38, 0.50], [0.06, 0.30])
     gap_m = 0.30 * pattern.ease_m + 0.002 + 0.006 * np.clip((0.10 - seamed.template_m[:, 2]) / 0.1, 0.0, 1.0)
-    cloth_m = draped(seamed, ease_m, Drape(gap_m=gap_m, passes=40, hold=hold))
-    depth_m = 0.28 * ease_m * np.clip(field_m / 0.05, 0.0, 1.0)
-    folded = _folded(replace(seamed, vertices_m=cloth_m), depth_m, (0.2, 0.3, 0.9), rng)
-    outside = replace(folded, weights=_onto(_eased_weights(seamed, 6), _TOP_MOVES))
+    edge = np.clip(field_m / 0.03, 0.0, 1.0)
+    arm = arm_share(seamed.weights)
+    long_sleeves = pattern.sleeve_m > _SHORT_SLEEVE_M
+    fold_m = pattern.fold_m * (0.35 + 0.65 * edge) * top_folds(seamed.template_m, arm, long_sleeves, rng)
+    cloth_m = draped(seamed, ease_m, Drape(gap_m, _top_hold(pattern, seamed, field_m), fold_m))
+    outside = replace(seamed, vertices_m=cloth_m, weights=_onto(_eased_weights(seamed, 6), _TOP_MOVES))
     sewn = hemmed(outside, field_m, _HEM_M, pattern.thickness_m)
     on_arm = arm_share(_template_weights(sewn, seamed))[sewn.faces].mean(axis=1) > 0.5
     uv = trunk(sewn)
     uv[on_arm] = limbs(sewn, ("shoulder", "wrist"), _ARM_RADIUS_M, (0.0, -0.7, -0.7))[on_arm]
-    part = ActorPart("top", sewn.faces, uv / np.float32(fabric.tile_m), _material("top", fabric))
-    return collar(Piece(sewn.vertices_m, sewn.weights, (part,)), outside, pattern.collar, fabric)
+    shown = np.ones(len(sewn.faces), dtype=bool) if over is None else ~_hidden_by(over, sewn)
+    part = ActorPart("top", sewn.faces[shown], uv[shown] / np.float32(fabric.tile_m), _material("top", fabric))
+    finished = collar(Piece(sewn.vertices_m, sewn.weights, (part,)), outside, pattern.collar, fabric)
+    return joined((finished, *_top_details(pattern, outside, fabric)))
+
+
+def _top_details(pattern: TopPattern, outside: Surface, fabric: Fabric) -> tuple[Piece, ...]:
+    """Placket, buttons and pocket."""
+    shade = _material("top", fabric)
+    pieces: list[Piece] = []
+    if pattern.buttons_to_z_m is not None:
+        strip, template_m = placket(outside, front_m(outside.template_m), pattern.buttons_to_z_m, shade, fabric.tile_m)
+        pieces += [strip, buttons(strip, template_m, _BUTTON)]
+    if pattern.pocket:
+        pieces.append(patch(outside, chest_pocket_m(outside.template_m), 0.0018, "pocket", shade, fabric.tile_m)[0])
+    return tuple(pieces)
 
 
 def _template_weights(sewn: Surface, seamed: Surface) -> Float64[np.ndarray, "P J"]:
@@ -127,20 +148,38 @@ def sew_trousers(
     field_m = _edged(seamed, trouser_field_m(pattern, seamed.template_m, seamed.weights))
     hip, leg = pattern.hip_ease_m, pattern.leg_ease_m
     below = along_leg_m(seamed.template_m)
-    ease_m = np.interp(below, [-0.1, 0.05, 0.3, 0.55, 0.8], [0.5 * hip, hip, 0.8 * leg, leg, 0.7 * leg])
-    cloth_m = draped(seamed, ease_m, Drape(np.full(len(ease_m), 0.4 * hip), passes=60, hold=np.full(len(ease_m), 0.04)))
-    depth_m = np.interp(below, [0.0, 0.2, 0.4, 0.55, 0.7, 0.8], [0.002, 0.001, 0.004, 0.0015, 0.004, 0.003])
-    depth_m *= np.clip(field_m / 0.04, 0.0, 1.0) * leg / 0.02
-    folded = _folded(replace(seamed, vertices_m=cloth_m), depth_m, (0.25, 0.15, 0.9), rng)
+    # Legs are cut straight: at the ankle there is most room.
+    ease_m = np.interp(
+        below,
+        [-0.1, 0.05, 0.25, 0.42, 0.55, 0.68, 0.80],
+        [0.5 * hip, hip, 0.8 * leg, leg, 0.8 * leg, 1.3 * leg, 1.6 * leg],
+    )
+    hold = np.maximum(np.interp(below, [-0.02, 0.02], [0.25, 0.0]), 0.2 * np.clip(1.0 - field_m / 0.03, 0.0, 1.0))
+    edge = np.clip(field_m / 0.03, 0.0, 1.0)
+    fold_m = pattern.fold_m * (0.35 + 0.65 * edge) * trouser_folds(seamed.template_m, rng)
+    cloth_m = draped(seamed, ease_m, Drape(np.full(len(ease_m), 0.4 * hip), hold, fold_m))
+    folded = replace(seamed, vertices_m=cloth_m)
     weights = _onto(_eased_weights(seamed, 6), {"foot": ("ankle", 1.0), "ankle": ("knee", 0.75)})
     sewn = hemmed(replace(folded, weights=weights), field_m, _HEM_M, pattern.thickness_m)
-    return _under(top, sewn, limbs(sewn, ("hip", "ankle"), _LEG_RADIUS_M, (0.1, -1.0, 0.0)), fabric, "trousers")
+    legs = _under(top, sewn, limbs(sewn, ("hip", "ankle"), _LEG_RADIUS_M, (0.1, -1.0, 0.0)), fabric, "trousers")
+    if not pattern.pockets:
+        return legs
+    outside = replace(folded, weights=weights)
+    pockets, _ = patch(
+        outside, back_pockets_m(outside.template_m), 0.002, "pockets", _material("trousers", fabric), fabric.tile_m
+    )
+    return joined((legs, pockets))
+
+
+def _hidden_by(top: TopPattern, sewn: Surface) -> Bool[np.ndarray, " F"]:
+    """Faces of a garment that lie well under a top."""
+    tucked = top_field_m(top, sewn.template_m, sewn.weights) > _TUCKED_M
+    return np.asarray(np.all(tucked[sewn.faces], axis=1))
 
 
 def _under(top: TopPattern, sewn: Surface, uv: np.ndarray, fabric: Fabric, name: str) -> Piece:
     """A finished garment without the faces that the top hides."""
-    tucked = top_field_m(top, sewn.template_m, sewn.weights) > _TUCKED_M
-    shown = ~np.all(tucked[sewn.faces], axis=1)
+    shown = ~_hidden_by(top, sewn)
     part = ActorPart(name, sewn.faces[shown], uv[shown] / np.float32(fabric.tile_m), _material(name, fabric))
     return Piece(sewn.vertices_m, sewn.weights, (part,))
 
@@ -154,8 +193,8 @@ def sew_skirt(
     field_m = _edged(cut, skirt_field_m(pattern, cut.template_m, cut.weights))
     outward = smooth_normals(cut)
     eased_m = _fitted(wearer, cut) + pattern.hip_ease_m * outward
-    depth_m = np.interp(cut.template_m[:, 2], [pattern.hem_z_m, 0.0, 0.1], [0.010, 0.003, 0.0])
-    folded = _folded(replace(cut, vertices_m=eased_m), depth_m, (0.5, 0.8, 0.0), rng)
+    height_m = 0.013 * skirt_folds(cut.template_m, pattern.hem_z_m, rng)
+    folded = replace(cut, vertices_m=eased_m + height_m[:, None] * outward)
     sewn = hemmed(replace(folded, weights=_skirt_weights(cut)), field_m, _HEM_M, pattern.thickness_m)
     middle = np.array([0.02, 0.0, 0.1])
     uv = around(
