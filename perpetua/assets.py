@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +22,7 @@ def asset_folder() -> Path:
 
 @dataclass(frozen=True)
 class Asset:
-    """One entry of the manifest. An asset is a Python ``package`` or ``files`` below the asset folder."""
+    """One entry of the manifest: a Python ``package``, a ``program`` on PATH, or ``files`` below the asset folder."""
 
     name: str
     what: str
@@ -30,6 +31,7 @@ class Asset:
     without_it: str
     config_key: str = ""
     package: str = ""
+    program: str = ""
     files: tuple[str, ...] = ()
     sha256: tuple[str, ...] = ()
 
@@ -38,6 +40,9 @@ class Asset:
         if self.package:
             spec = importlib.util.find_spec(self.package)
             return Path(spec.origin).parent if spec is not None and spec.origin is not None else None
+        if self.program:
+            found = shutil.which(self.program)
+            return Path(found) if found is not None else None
         places = [asset_folder() / name for name in self.files]
         return places[0] if places and all(place.exists() for place in places) else None
 

@@ -17,29 +17,9 @@ import numpy as np
 FPS = 30
 MODELS = {"Kimodo-SOMA-RP-v1": 77, "Kimodo-SOMA-SEED-v1": 77, "Kimodo-SMPLX-RP-v1": 22}
 PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
-SMPLX = [
-    "pelvis",
-    "left_hip",
-    "right_hip",
-    "spine1",
-    "left_knee",
-    "right_knee",
-    "spine2",
-    "left_ankle",
-    "right_ankle",
-    "spine3",
-    "left_foot",
-    "right_foot",
-    "neck",
-    "left_collar",
-    "right_collar",
-    "head",
-    "left_shoulder",
-    "right_shoulder",
-    "left_elbow",
-    "right_elbow",
-    "left_wrist",
-    "right_wrist",
+TRUNK = ["pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle"]
+SMPLX = [*TRUNK, "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head"] + [
+    f"{side}_{name}" for name in ("shoulder", "elbow", "wrist") for side in ("left", "right")
 ]
 ARM = {"Shoulder": "collar", "Arm": "shoulder", "ForeArm": "elbow", "Hand": "wrist"}
 LEG = {"Leg": "hip", "Shin": "knee", "Foot": "ankle", "ToeBase": "foot", "ToeEnd": "foot"}
@@ -152,8 +132,8 @@ def main() -> None:
         raise SystemExit(3)
     path, heading = check(arguments)
     folder = Path(__file__).parent
-    words = [name.stem.partition("_")[2] for name in sorted(folder.glob("stride_*.npz"))]
-    word = next((word for word in words if word in arguments.prompt), "walk")
+    words = {name.stem.partition("_")[2] for name in folder.glob("stride_*.npz")} - {"walk"}
+    word = next((word for word in sorted(words) if word in arguments.prompt), "walk")
     stride = dict(np.load(folder / f"stride_{word}.npz"))
     with (folder / "calls.txt").open("a", encoding="utf-8") as log:
         log.write(json.dumps(sys.argv[1:]) + "\n")

@@ -57,6 +57,7 @@ def body_along(
             world_from_joint[:, joint_index(f"{side}_ankle")],
             world_from_joint[:, joint_index(f"{side}_foot")],
             _at_rows(tape.standing[:, foot], ride.row),
+            ride.stands,
         )
         feet.append(plant_foot(wanted, foot_of(skeleton, side), going.place_m[:, 2]))
     legs = (leg_of(skeleton, "left"), leg_of(skeleton, "right"))

@@ -31,6 +31,8 @@ _BONES: dict[str, tuple[str, tuple[float, float, float], float]] = {
     "left_shoulder": ("left_elbow", _LEFT, 12.0), "right_shoulder": ("right_elbow", _RIGHT, 12.0),
     "left_elbow": ("left_wrist", _LEFT, 12.0), "right_elbow": ("right_wrist", _RIGHT, 12.0),
 }  # fmt: skip
+# A zero pose whose pelvis frame is this near to the file's axes is along them (sine of the angle).
+_UPRIGHT = 0.2
 # A collection along one axis turns legs and feet about the body's left, arms about its front.
 _ARMS = ("collar", "shoulder", "elbow", "wrist")
 
@@ -87,7 +89,8 @@ def _zero_pose(rest: Float64[np.ndarray, "J 3"], match: NameMatch, path: Path) -
         name = BODY_JOINTS[joint]
         if parent < 0:
             continue
-        above = turned[BODY_JOINTS[parent]]
+        # Collar bones point where they may: arms are turned from the chest.
+        above = turned["spine3" if name.endswith("shoulder") else BODY_JOINTS[parent]]
         end = _BONES[name][0] if name in _BONES else ""
         if name not in place or end not in place or np.linalg.norm(place[end] - place[name]) < 1e-9:
             turned[name] = above
@@ -106,7 +109,10 @@ def _pelvis_frame(place: dict[str, Float64[np.ndarray, "3"]], path: Path) -> Flo
     if np.linalg.norm(np.cross(up, left)) < 1e-6 * float(np.linalg.norm(up)):
         raise AssetError(f"'{path}': hips and spine of the skeleton lie on one line; no front can be told")
     columns = frames_along(left[None], up[None])[0]
-    return np.stack([np.cross(columns[:, 0], columns[:, 1]), columns[:, 0], columns[:, 1]], axis=1)
+    frame = np.stack([np.cross(columns[:, 0], columns[:, 1]), columns[:, 0], columns[:, 1]], axis=1)
+    # A head somewhat before the pelvis is how people are built, not how they are turned.
+    upright = np.rint(frame)
+    return upright if np.abs(frame - upright).max() < _UPRIGHT else frame
 
 
 def _swing(

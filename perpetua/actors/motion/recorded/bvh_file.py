@@ -197,7 +197,7 @@ def _local_rotation(joint: BvhJoint, columns: Float64[np.ndarray, "T K"]) -> Flo
 def _euler(axes: str, angle_deg: Float64[np.ndarray, "T K"]) -> Float64[np.ndarray, "T 3 3"]:
     rotation = np.eye(3)
     for column, axis in enumerate(axes):
-        rotation = rotation @ Rotation.from_euler(axis, angle_deg[:, column], degrees=True).as_matrix()
+        rotation = rotation @ Rotation.from_euler(axis, angle_deg[:, [column]], degrees=True).as_matrix()
     return np.asarray(rotation)
 
 

@@ -8,6 +8,7 @@ its T-pose; a heading of 0 faces +Z and grows towards +X, which is our heading i
 import json
 import re
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -108,7 +109,7 @@ def _about_a_person(sentence: str) -> str:
 
 def _shares(total: int, count: int) -> list[int]:
     edges = [round(total * index / count) for index in range(count + 1)]
-    return [end - start for start, end in zip(edges[:-1], edges[1:], strict=True)]
+    return [end - start for start, end in pairwise(edges)]
 
 
 def read_result(folder: Path, stem: str, wish: Wish) -> Clip:

@@ -20,12 +20,16 @@ _SWING_CLEARANCE_M = 0.012
 
 @dataclass(frozen=True)
 class WantedFoot:
-    """Where a foot would be if nothing held it: the ankle, and the foot's and the toes' world rotation."""
+    """Where a foot would be if nothing held it: the ankle, and the foot's and the toes' world rotation.
+
+    ``rests`` says how much of its pitch it has to lose (0 to 1) because the body waits in the middle of a stride.
+    """
 
     ankle_m: Float64[np.ndarray, "N 3"]
     world_from_foot: Float64[np.ndarray, "N 3 3"]
     world_from_toes: Float64[np.ndarray, "N 3 3"]
     stands: Bool[np.ndarray, " N"]
+    rests: Float64[np.ndarray, " N"]
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,8 @@ def _angles(wanted: WantedFoot) -> _Angles:
     if middles:
         lie_rad = float(np.median(np.concatenate([pitch_rad[middle] for middle in middles])))
         pitch_rad, toe_pitch_rad = pitch_rad - lie_rad, toe_pitch_rad - lie_rad
-    return _Angles(yaw_rad, pitch_rad, toe_pitch_rad)
+    left = 1.0 - wanted.rests
+    return _Angles(yaw_rad, left * pitch_rad, left * toe_pitch_rad)
 
 
 def _fill_stance(

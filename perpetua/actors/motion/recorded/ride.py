@@ -18,6 +18,10 @@ _SLOWEST, _FASTEST = 0.5, 1.7
 # Longest stride along the heading and across it, in strides of the tape.
 _LONGEST_STRIDE, _LONGEST_SIDE_STRIDE = 1.6, 0.22
 _HOLD_BLEND_S = 0.5
+# Below this speed a step hardly goes ahead, so a foot that has landed need not be put beside the other.
+_SLOW_MPS = 0.5
+# A body that has stopped puts its feet together this quickly, in the tape's own speed.
+_CLOSING_RATE = 1.2
 
 
 @dataclass(frozen=True)
@@ -92,13 +96,24 @@ def ride_along(tape: Tape, going: Going, clock: Clock) -> Ride:
     return Ride(row, np.gradient(row, clock.step_s) / TAPE_HZ, _standing_share(stops, clock))
 
 
-def _holds(going: Going, clock: Clock) -> list[tuple[int, int]]:
-    holds = []
+@dataclass(frozen=True)
+class _Hold:
+    """Ticks from which until which the route stays; ``slow`` is when it had slowed down so far that steps are small."""
+
+    start: int
+    end: int
+    slow: int
+
+
+def _holds(going: Going, clock: Clock) -> dict[int, _Hold]:
+    """Where the route stays for a while, by the first tick."""
+    holds = {}
+    slow = runs(going.speed_mps < _SLOW_MPS)
     for start, end in runs(going.speed_mps < _STILL_MPS):
         place_m = going.place_m[start:end, :2]
         near = np.linalg.norm(place_m - place_m[len(place_m) // 2], axis=1).max() < _STILL_M
         if near and (end - start) * clock.step_s >= _LEAST_HOLD_S:
-            holds.append((start, end))
+            holds[start] = _Hold(start, end, next(first for first, last in slow if first <= start < last))
     return holds
 
 
@@ -124,25 +139,25 @@ def _integrate(
     tape: Tape,
     terms: Float64[np.ndarray, "N 3"],
     speeds: Float64[np.ndarray, " L"],
-    holds: list[tuple[int, int]],
+    holds: dict[int, _Hold],
     ready: Float64[np.ndarray, " K"],
     clock: Clock,
 ) -> tuple[Float64[np.ndarray, " N"], list[tuple[int, int]]]:
     """Rows, and the times between which the tape waits."""
     count, last = len(terms), len(tape) - 1
-    row, at, stops = np.empty(count), 0.0, []
-    starts = dict(holds)
+    row, at = np.empty(count), 0.0
+    stops: list[tuple[int, int]] = []
     target, release = np.inf, 0
     for tick in range(count):
-        if tick in starts:
-            release = starts[tick]
-            target = _stop_row(tape, at, ready, tick == 0)
+        if tick in holds:
+            release = holds[tick].end
+            target = _stop_row(tape, row[holds[tick].slow] if tick > 0 else None, at, ready)
             at = target if tick == 0 and np.isfinite(target) else at
         if tick >= release:
             target = np.inf
         row[tick] = at
         rate = _rate(terms[tick], float(speeds[min(int(at), last)]))
-        going_on = max(rate, 0.8) if np.isfinite(target) else rate
+        going_on = max(rate, _CLOSING_RATE) if np.isfinite(target) else rate
         following = min(at + going_on * clock.step_s * TAPE_HZ, last)
         if following >= target:
             stops = stops if stops and stops[-1][1] == release else [*stops, (tick, release)]
@@ -151,17 +166,14 @@ def _integrate(
     return row, stops
 
 
-def _stop_row(tape: Tape, at: float, ready: Float64[np.ndarray, " K"], begins: bool) -> float:
-    """The double support at which to wait: at once where the sequence begins, else when both feet have landed."""
+def _stop_row(tape: Tape, slow: float | None, at: float, ready: Float64[np.ndarray, " K"]) -> float:
+    """The double support at which to wait: the first, or that after both feet have landed since row ``slow``."""
     ahead = ready[ready >= at]
-    if len(ahead) == 0:
-        return np.inf
-    if begins:
-        return float(ahead[0])
+    if slow is None:
+        return float(ahead[0]) if len(ahead) > 0 else np.inf
     for candidate in ahead:
-        since = tape.standing[int(at) : int(candidate) + 1]
-        landed = (~since[:-1] & since[1:]).any(axis=0)
-        if landed.all():
+        since = tape.standing[int(slow) : int(candidate) + 1]
+        if (~since[:-1] & since[1:]).any(axis=0).all():
             return float(candidate)
     return np.inf
 

@@ -54,10 +54,15 @@ class Tape:
 
     def rows(self, row: Int64[np.ndarray, " N"]) -> "Tape":
         """A tape of these rows of this one."""
-        fingers = self.finger_from_parent
         return Tape(
-            *(getattr(self, name)[row] for name in _ARRAYS),
-            finger_from_parent=None if fingers is None else fingers[row],
+            self.path_m[row],
+            self.heading_rad[row],
+            self.path_from_joint[row],
+            self.offset_m[row],
+            self.velocity_mps[row],
+            self.turn_rps[row],
+            self.standing[row],
+            None if self.finger_from_parent is None else self.finger_from_parent[row],
         )
 
     def mixed(self, other: "Tape", share: Float64[np.ndarray, " L"]) -> "Tape":
@@ -76,9 +81,6 @@ class Tape:
             np.where(weight < 0.5, self.standing, other.standing),
             fingers,
         )
-
-
-_ARRAYS = ("path_m", "heading_rad", "path_from_joint", "offset_m", "velocity_mps", "turn_rps", "standing")
 
 
 def make_tape(clip: Clip, skeleton: Skeleton) -> Tape:
