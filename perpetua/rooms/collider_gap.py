@@ -3,21 +3,24 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 
 from perpetua.geometry.mesh import TriMesh, face_areas_m2, join
 from perpetua.geometry.raycast import Caster
-from perpetua.rooms.types import SceneObject
+from perpetua.navigation.raster import inside_polygon
+from perpetua.rooms.types import Room
 
 SAMPLES = 20_000
 FAR_M = 0.02
+# The outer side of the walls, which nobody sees, lies further out than this.
+SHELL_M = 0.05
 # A search no wider than this is quick; what has no collider at all is counted as this far.
 LIMIT_M = 0.5
 
 
 @dataclass(frozen=True)
 class ColliderGap:
-    """Distances from points spread evenly over the rendered surface to the nearest collision surface, metres.
+    """Distances from points spread evenly over the surface inside a room to the nearest collision surface, metres.
 
     ``share_beyond_2_cm`` counts the points farther than 2 cm; no distance is counted as more than ``LIMIT_M``.
     """
@@ -29,13 +32,21 @@ class ColliderGap:
     share_beyond_2_cm: float
 
 
-def collider_gap(objects: tuple[SceneObject, ...], colliders: TriMesh) -> ColliderGap:
+def collider_gap(room: Room, colliders: TriMesh) -> ColliderGap:
     """Compares the rendered surface of a room with its collision meshes."""
-    points_m = _spread(join([thing.mesh for thing in objects]), SAMPLES)
-    distance_m = Caster(colliders).closest_distance(points_m, LIMIT_M)
+    points_m = _spread(join([thing.mesh for thing in room.objects]), SAMPLES)
+    distance_m = Caster(colliders).closest_distance(points_m[_inside(points_m, room)], LIMIT_M)
     median_m, p95_m, p99_m = (round(float(value), 5) for value in np.quantile(distance_m, (0.5, 0.95, 0.99)))
     share = round(float((distance_m > FAR_M).mean()), 5)
     return ColliderGap(median_m, p95_m, p99_m, round(float(distance_m.max()), 5), share)
+
+
+def _inside(points_m: Float64[np.ndarray, "N 3"], room: Room) -> Bool[np.ndarray, " N"]:
+    """Which points lie on or within the inner sides of floor, walls and ceiling."""
+    half_m = 0.5 * np.ptp(room.floor_polygon_m, axis=0)
+    grown_m = room.floor_polygon_m * (1.0 + SHELL_M / half_m)
+    level = (points_m[:, 2] > -SHELL_M) & (points_m[:, 2] < room.height_m + SHELL_M)
+    return np.asarray(level & inside_polygon(points_m[:, :2], grown_m))
 
 
 def _spread(mesh: TriMesh, count: int) -> Float64[np.ndarray, "N 3"]:

@@ -103,4 +103,4 @@ def _run_script(folder: Path, config: RoomsConfig) -> None:
 def _collider_gap(folder: Path, room: Room) -> ColliderGap:
     with np.load(folder / "meshes.npz", allow_pickle=False) as arrays:
         colliders = TriMesh(arrays["collider_vertices_m"], arrays["collider_faces"])
-    return collider_gap(room.objects, colliders)
+    return collider_gap(room, colliders)
