@@ -20,11 +20,11 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from perpetua.blender import SCRIPT_FOLDER
 from perpetua.errors import PerpetuaError
 from perpetua.files import read_json, write_json
 from perpetua.navigation.config import NavigationConfig
 from perpetua.pipeline.memory import PeakMemory
+from perpetua.rendering.scripts import scripts_sha256
 from perpetua.rooms.build import REPORT_FILE, build_room
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.fingerprint import room_sha256
@@ -76,12 +76,16 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _code_sha256() -> str:
-    """Of all code that a room depends on."""
+def _code_sha256(source: str) -> str:
+    """Of the code that makes and checks the rooms of a source."""
     digest = hashlib.sha256()
-    for folder in (PACKAGE / "rooms", PACKAGE / "navigation", PACKAGE / "geometry", SCRIPT_FOLDER):
-        for path in sorted(folder.rglob("*.py")):
-            digest.update(path.relative_to(PACKAGE.parent).as_posix().encode() + path.read_bytes())
+    if source == "infinigen":
+        digest.update(scripts_sha256(("infinigen_room.py",)).encode())
+    rooms = PACKAGE / "rooms"
+    modules = ("acceptance", "build", "collider_gap", "config", "infinigen", "source", "support")
+    paths = [rooms / f"{module}.py" for module in modules]
+    for path in paths + (sorted((rooms / "procedural").glob("*.py")) if source == "procedural" else []):
+        digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 
 
@@ -91,7 +95,7 @@ def _result(out: Path, seed: int) -> dict[str, Any]:
 
 def _run(seed: int, options: argparse.Namespace) -> None:
     """Makes the room of a seed in a process of its own, unless it is there."""
-    if _result(options.out, seed).get("code") == _code_sha256():
+    if _result(options.out, seed).get("code") == _code_sha256(options.source):
         return
     subprocess.run([sys.executable, __file__, *sys.argv[1:], "--one", str(seed)], check=True)
 
@@ -99,7 +103,7 @@ def _run(seed: int, options: argparse.Namespace) -> None:
 def _measure(seed: int, options: argparse.Namespace) -> None:
     folder = options.out / f"{seed:04d}"
     folder.mkdir(parents=True, exist_ok=True)
-    code = _code_sha256()
+    code = _code_sha256(options.source)
     kinds = {} if options.kind is None else {"kinds": (options.kind,)}
     config = RoomsConfig(source=options.source, **kinds)
     result: dict[str, Any] = {"seed": seed, "code": code}

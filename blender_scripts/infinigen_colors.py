@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps the colours of large surfaces within what rooms are painted and built in.
+"""Keeps the colours of surfaces within what rooms are painted and furnished in.
 
-Infinigen draws the hue and saturation of wall paint freely, so some walls come out in neon green. What covers a room
-(walls, ceiling, floor) has its base colour limited in its shader: saturation (of linear RGB, as in HSV) up to a cap,
-and reflectance between coal and fresh plaster. The cap follows the hue: brick, clay and wood are saturated oranges and
-stay as they are; paints of other hues are pastels. Patterns keep their contrast, as each shaded point is limited alone.
+Infinigen draws the hue and saturation of paint freely, so some walls come out in neon green and some cupboards black
+as a hole. Every base colour is limited in its shader: saturation (of linear RGB, as in HSV) up to a cap, and
+reflectance between coal and fresh plaster. The caps are tight on what covers a room (walls, ceiling, floor) and wide
+on furniture. They follow the hue: brick, clay and wood are saturated oranges and stay as they are; paints of other
+hues are pastels. Patterns keep their contrast, as each shaded point is limited alone.
 """
 
 import bpy
@@ -13,21 +14,21 @@ from opaque_materials import shader_trees
 # Hue of clay and wood, and the distance from it (turns of the colour wheel) where the cap begins and ends to fall.
 WARM_HUE, WARM_REACH, COLD_REACH = 0.07, 0.07, 0.16
 # Largest saturation of warm and of other hues, by what the surface is.
-CAPS = {"wall": (0.62, 0.32), "ceiling": (0.35, 0.15), "floor": (0.75, 0.4)}
-LARGE = frozenset(CAPS)
+CAPS = {"wall": (0.62, 0.32), "ceiling": (0.35, 0.15), "floor": (0.75, 0.4), "furniture": (0.95, 0.75)}
 # Least and largest value: even black paint reflects some light, and no wall all of it.
-MIN_VALUE = {"wall": 0.08, "ceiling": 0.45, "floor": 0.06}
+MIN_VALUE = {"wall": 0.08, "ceiling": 0.45, "floor": 0.06, "furniture": 0.035}
 MAX_VALUE = 0.86
 LIMIT = "limit_color"
 
 
 def tame_colors(things: list[bpy.types.Object], categories: list[str]) -> None:
-    """Limits the colours of all materials on large surfaces; one that several kinds share follows the first."""
+    """Limits the colours of all materials; one that several kinds of surface share follows the largest."""
     kinds: dict[str, str] = {}
-    for thing, category in zip(things, categories, strict=True):
+    by_size = sorted(zip(categories, things, strict=True), key=lambda entry: entry[0] not in CAPS)
+    for category, thing in by_size:
         for material in thing.data.materials:
-            if category in LARGE and material is not None and material.use_nodes:
-                kinds.setdefault(material.name, category)
+            if material is not None and material.use_nodes:
+                kinds.setdefault(material.name, category if category in CAPS else "furniture")
     groups: set[str] = set()
     for name, kind in kinds.items():
         root, *inner = shader_trees(bpy.data.materials[name].node_tree)

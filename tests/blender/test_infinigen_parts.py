@@ -145,6 +145,8 @@ COLORS = [
     ("black", "wall", (0.001, 0.001, 0.001)),
     ("blue_ceiling", "ceiling", (0.05, 0.1, 0.9)),
     ("sofa", "sofa", (0.05, 0.8, 0.1)),
+    ("chair", "chair", (0.1, 0.2, 0.3)),
+    ("shelf", "cabinet", (0.0, 0.0, 0.0)),
 ]
 
 
@@ -185,8 +187,11 @@ def test_wall_colours_are_calm_and_natural_ones_stay(answer: dict[str, Any]) -> 
     assert _saturation(tamed["blue_ceiling"]) == pytest.approx(0.15, abs=0.01)
 
 
-def test_furniture_keeps_its_colours(answer: dict[str, Any]) -> None:
-    np.testing.assert_allclose(answer["tamed"]["sofa"], (0.05, 0.8, 0.1), atol=1e-3)
+def test_furniture_keeps_strong_colours(answer: dict[str, Any]) -> None:
+    tamed = answer["tamed"]
+    assert _saturation(tamed["sofa"]) == pytest.approx(0.75, abs=0.01)
+    np.testing.assert_allclose(tamed["chair"], (0.1, 0.2, 0.3), atol=1e-3)
+    assert max(tamed["shelf"]) == pytest.approx(0.035, abs=1e-3)
 
 
 def test_sun_and_sky_follow_the_time_of_day(answer: dict[str, Any]) -> None:
