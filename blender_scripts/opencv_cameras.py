@@ -15,13 +15,13 @@ CLIP_END_M = 1000.0
 BLENDER_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
-def add_camera(name: str) -> bpy.types.Object:
-    """A camera without depth of field, not yet placed."""
+def add_camera(name: str, near_m: float | None) -> bpy.types.Object:
+    """A camera without depth of field, not yet placed; it sees nothing that is nearer along its axis."""
     lens = bpy.data.cameras.new(name)
     lens.type = "PERSP"
     lens.sensor_fit = "HORIZONTAL"
     lens.sensor_width = SENSOR_WIDTH_MM
-    lens.clip_start, lens.clip_end = CLIP_START_M, CLIP_END_M
+    lens.clip_start, lens.clip_end = CLIP_START_M if near_m is None else near_m, CLIP_END_M
     lens.dof.use_dof = False
     camera = bpy.data.objects.new(name, lens)
     bpy.context.scene.collection.objects.link(camera)

@@ -37,9 +37,10 @@ class View:
 
     def __init__(self, settings: dict, arrays: JobArrays) -> None:
         self.number: int = settings["camera"]
+        self.near_m: float | None = settings["near_m"]
         self._intrinsics = settings["intrinsics"]
         self._world_from_camera = arrays.load(settings["world_from_camera"])
-        self._object = opencv_cameras.add_camera(f"camera_{self.number}")
+        self._object = opencv_cameras.add_camera(f"camera_{self.number}", self.near_m)
 
     def aim(self, frame: int) -> None:
         """Makes the next render one of this view at a frame."""
@@ -78,13 +79,14 @@ class FrameRenderer:
         self._worker.emit("ready", exposure_ev=development.exposure_ev, gains=development.gains)
 
     def _meter(self) -> np.ndarray:
-        """Linear pixels f32[N, 3] of all views at a few frames."""
+        """Linear pixels f32[N, 3] of all views at a few frames; cutaways do not count beside whole views."""
         frames = self._job["frames"]
+        views = [view for view in self._views if view.near_m is None] or self._views
         test = auto_exposure.TestRender(self._folder)
         pixels = []
         for frame in sorted({round(k * (frames - 1) / (METERED_FRAMES - 1)) for k in range(METERED_FRAMES)}):
             pose_all(self._actors, frame)
-            for view in self._views:
+            for view in views:
                 view.aim(frame)
                 pixels.append(test.pixels())
                 self._worker.emit("metered", frame=frame)

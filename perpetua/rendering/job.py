@@ -6,6 +6,7 @@ A file of arrays is named after its content, so job.json alone says whether two 
 import hashlib
 import json
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -38,8 +39,11 @@ def write_job(
     cameras: tuple[CameraPath, ...],
     config: RenderConfig,
     device: str,
+    near_m: Mapping[int, float],
 ) -> Path:
     """Writes a job into an existing folder; what an earlier, different job left there is removed.
+
+    ``near_m`` holds, by number of camera, where its view begins, if not at the camera.
 
     Returns:
         The path of job.json.
@@ -50,7 +54,7 @@ def write_job(
         "frames": len(cameras[0].world_from_camera),
         "room": _room_settings(room, writer),
         "actors": [_actor_settings(actor, writer) for actor in actors],
-        "cameras": [_camera_settings(camera, writer) for camera in cameras],
+        "cameras": [_camera_settings(camera, near_m.get(camera.camera), writer) for camera in cameras],
         "settings": config.model_dump(mode="json", exclude=set(PROCESS_SETTINGS)),
     }
     digest = hashlib.sha256(json.dumps(job, sort_keys=True).encode()).hexdigest()
@@ -154,10 +158,11 @@ def _actor_settings(actor: ActorMesh, writer: _ArrayWriter) -> Settings:
     }
 
 
-def _camera_settings(camera: CameraPath, writer: _ArrayWriter) -> Settings:
+def _camera_settings(camera: CameraPath, near_m: float | None, writer: _ArrayWriter) -> Settings:
     intrinsics = camera.intrinsics
     return {
         "camera": camera.camera,
+        "near_m": near_m,
         "world_from_camera": writer.write("world_from_camera", camera.world_from_camera),
         "intrinsics": {
             "fx_px": float(intrinsics.fx_px),

@@ -1,9 +1,10 @@
 """The render stage: writes the job, keeps Blender running until every frame is there, reads the frames."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 from perpetua.actors.types import ActorMesh
 from perpetua.blender import BlenderError, Event, run_script
@@ -21,6 +22,7 @@ logger = logging.getLogger(__name__)
 
 DEVICES = ("auto", "cpu", "cuda", "optix", "hip", "metal", "oneapi")
 MAX_OBJECT_INDEX = 65535
+WHOLE_VIEWS: Mapping[int, float] = MappingProxyType({})
 
 
 def render_views(
@@ -33,6 +35,7 @@ def render_views(
     on_frame: Callable[[int, int, float], None],
     script: Path = RENDER_SCRIPT,
     result_dir: Path | None = None,
+    near_m: Mapping[int, float] = WHOLE_VIEWS,
 ) -> tuple[RenderedView, ...]:
     """Renders synchronized RGB, depth and object index of all views.
 
@@ -49,6 +52,8 @@ def render_views(
         on_frame: called with (frames done, frames in all, seconds of this frame).
         script: the worker that Blender runs.
         result_dir: folder for the files that the returned arrays are mapped from; None: ``work_dir``.
+        near_m: by number of camera, the depth at which its view begins: what is nearer is left out of the picture,
+            and still blocks and reflects light. Exposure is not metered on such a cutaway.
 
     Returns:
         One view per camera, in the order of the cameras.
@@ -61,7 +66,7 @@ def render_views(
     work_dir.mkdir(parents=True, exist_ok=True)
     if room.blend_path is not None:
         room = replace(room, blend_path=bake_room(room, config, frame_count * len(cameras), work_dir))
-    job_path = write_job(work_dir, room, actors, cameras, config, device)
+    job_path = write_job(work_dir, room, actors, cameras, config, device, near_m)
     _render_pending(job_path, cameras, frame_count, config, on_frame, script)
     frames = work_dir / FRAME_FOLDER
     return tuple(assemble_view(frames, camera, frame_count, result_dir or work_dir) for camera in cameras)
