@@ -187,7 +187,7 @@ def test_a_program_that_is_missing_or_of_another_version_says_so(program: Path, 
 
 
 def test_the_robot_is_refused_by_name_and_by_its_joints(program: Path, tmp_path: Path) -> None:
-    with pytest.raises(AssetError, match="robot.*SOMA"):
+    with pytest.raises(AssetError, match=r"robot.*SOMA"):
         _make(program, _route(), model="Kimodo-G1-RP-v1")
     wish = make_wish("walks", RoutePath(_route(), FPS))
     frames = sum(wish.frames)

@@ -8,7 +8,7 @@ from perpetua.actors.motion.recorded.body import body_along
 from perpetua.actors.motion.recorded.clip import Clip
 from perpetua.actors.motion.recorded.kimodo_files import KIMODO_FPS, LEAD_S, Wish, make_wish
 from perpetua.actors.motion.recorded.kimodo_program import generate
-from perpetua.actors.motion.recorded.ride import going_along, make_clock, real_time
+from perpetua.actors.motion.recorded.ride import going_facing, make_clock, real_time
 from perpetua.actors.motion.recorded.tape import make_tape
 from perpetua.actors.motion.source import MOTION_SOURCES
 from perpetua.actors.types import BodyMotion, Route, Skeleton
@@ -43,16 +43,9 @@ class KimodoMotion:
         # Whole frames within what was made beyond the ends of the route.
         margin_s = np.floor(LEAD_S * fps) / fps
         clock = make_clock(len(route.heading_rad), fps, margin_s, margin_s)
-        return body_along(
-            make_tape(clip, skeleton),
-            None,
-            real_time(clock, LEAD_S),
-            going_along(path, clock),
-            clock,
-            skeleton,
-            route.actor,
-            fps,
-        )
+        tape, ride = make_tape(clip, skeleton), real_time(clock, LEAD_S)
+        going = going_facing(path, clock, tape, ride)
+        return body_along(tape, None, ride, going, clock, skeleton, route.actor, fps)
 
 
 def _check_path(clip: Clip, wish: Wish, actor: int, config: KimodoConfig) -> None:

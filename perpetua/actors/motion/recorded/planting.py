@@ -68,17 +68,24 @@ def plant_foot(wanted: WantedFoot, shape: FootShape, floor_m: Float64[np.ndarray
 
 
 def _angles(wanted: WantedFoot) -> _Angles:
-    ahead, toes = wanted.world_from_foot[:, :, 0], wanted.world_from_toes[:, :, 0]
-    pitch_rad = np.arcsin(np.clip(-ahead[:, 2], -1.0, 1.0))
-    toe_pitch_rad = np.arcsin(np.clip(-toes[:, 2], -1.0, 1.0))
-    yaw_rad = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+    # The axis to the left tells the yaw however far the foot is pitched; a running foot goes beyond the vertical.
+    left = wanted.world_from_foot[:, :, 1]
+    yaw_rad = np.unwrap(np.arctan2(-left[:, 0], left[:, 1]))
+    pitch_rad, toe_pitch_rad = (
+        _pitch_rad(rotation[:, :, 0], yaw_rad) for rotation in (wanted.world_from_foot, wanted.world_from_toes)
+    )
     # Skeletons differ in what they call a flat foot: it is how the sole lies in the middle of a stance.
     middles = [(slice(start + (end - start) // 3, end - (end - start) // 2 + 1)) for start, end in runs(wanted.stands)]
     if middles:
         lie_rad = float(np.median(np.concatenate([pitch_rad[middle] for middle in middles])))
         pitch_rad, toe_pitch_rad = pitch_rad - lie_rad, toe_pitch_rad - lie_rad
-    left = 1.0 - wanted.rests
-    return _Angles(yaw_rad, left * pitch_rad, left * toe_pitch_rad)
+    kept = 1.0 - wanted.rests
+    return _Angles(yaw_rad, kept * pitch_rad, kept * toe_pitch_rad)
+
+
+def _pitch_rad(ahead: Float64[np.ndarray, "N 3"], yaw_rad: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+    forward = ahead[:, 0] * np.cos(yaw_rad) + ahead[:, 1] * np.sin(yaw_rad)
+    return np.asarray(np.unwrap(np.arctan2(-ahead[:, 2], forward)))
 
 
 def _fill_stance(

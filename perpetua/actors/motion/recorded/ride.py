@@ -54,8 +54,17 @@ class Going:
 
 def going_along(path: RoutePath, clock: Clock) -> Going:
     """A route at the times of a clock; its speed counts turns on the spot."""
+    return _going(path, clock, path.heading_rad(clock.time_s))
+
+
+def going_facing(path: RoutePath, clock: Clock, tape: Tape, ride: "Ride") -> Going:
+    """A route at the times of a clock, facing as the tape does at each."""
+    row = np.clip(ride.row, 0.0, len(tape) - 1.0)
+    return _going(path, clock, np.interp(row, np.arange(len(tape)), tape.heading_rad))
+
+
+def _going(path: RoutePath, clock: Clock, heading_rad: Float64[np.ndarray, " N"]) -> Going:
     place_m = path.position_m(clock.time_s)
-    heading_rad = path.heading_rad(clock.time_s)
     soft_m = gaussian_filter1d(place_m[:, :2], 0.08 / clock.step_s, axis=0, mode="nearest")
     world_mps = np.gradient(soft_m, clock.step_s, axis=0)
     ahead, aside = np.cos(heading_rad), np.sin(heading_rad)

@@ -21,6 +21,8 @@ TURN_RADIUS_M = 0.25
 _CONTACT_HEIGHT_M = 0.045
 _CONTACT_SPEED_MPS = 0.4
 _LEAST_STANCE_S = 0.12
+# A file that says when feet stand is believed for stances as short as this.
+_LEAST_TOLD_S = 0.05
 _LEAST_SWING_S = 0.1
 # Share of frames in which the lowest sole point is at most as high as the floor.
 _FLOOR_SHARE = 0.3
@@ -94,7 +96,7 @@ def make_tape(clip: Clip, skeleton: Skeleton) -> Tape:
     feet_m = _feet_m(rotation, pelvis_m, skeleton)
     lowest_m = feet_m[..., 2].min(axis=1)
     floor_m = float(np.quantile(lowest_m, _FLOOR_SHARE))
-    standing = find_stances(feet_m, floor_m) if told is None else clean_stances(told)
+    standing = find_stances(feet_m, floor_m) if told is None else clean_stances(told, _LEAST_TOLD_S)
     path_m = _smooth(pelvis_m[:, :2])
     ahead = rotation[:, 0, :, 0]
     heading_rad = _smooth(np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))[:, None])[:, 0]
@@ -155,12 +157,12 @@ def find_stances(feet_m: Float64[np.ndarray, "L 4 3"], floor_m: float) -> Bool[n
     return clean_stances(np.stack([touches[:, :2].any(axis=1), touches[:, 2:].any(axis=1)], axis=1))
 
 
-def clean_stances(standing: Bool[np.ndarray, "L 2"]) -> Bool[np.ndarray, "L 2"]:
+def clean_stances(standing: Bool[np.ndarray, "L 2"], shortest_s: float = _LEAST_STANCE_S) -> Bool[np.ndarray, "L 2"]:
     """Without stances and swings too short to be any, and without short gaps in which neither foot stands."""
     cleaned = standing.copy()
     for foot in (0, 1):
         _flip_short(cleaned[:, foot], False, round(_LEAST_SWING_S * TAPE_HZ))
-        _flip_short(cleaned[:, foot], True, round(_LEAST_STANCE_S * TAPE_HZ))
+        _flip_short(cleaned[:, foot], True, round(shortest_s * TAPE_HZ))
     neither = ~cleaned.any(axis=1)
     for start, end in runs(neither):
         if start > 0 and end < len(neither) and end - start <= round(_LEAST_STANCE_S * TAPE_HZ):
