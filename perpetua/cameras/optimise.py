@@ -16,13 +16,13 @@ from perpetua.optimisation import deterministic_torch, minimise
 
 DEGREE = 3
 CONTROL_S = 0.6
-LEARNING_RATE_M = 0.02
+LEARNING_RATE_M = 0.12
 MARGIN = 0.15
 COVERED_POINTS = 2
 LINE_SAMPLES = 16
 LINE_WANTED_M = 0.12
 # Projected height, in images, above which an actor crowds the view.
-MOST_FOREGROUND = 1.3
+MOST_FOREGROUND = 1.2
 CROWD_WANTED_M = 0.3
 CROWD_POINTS = 3
 # What the field and the sub-steps of the audit may add up to; actors that fill the image are kept further off.
@@ -71,12 +71,13 @@ def optimise_paths(problem: Problem, config: CamerasConfig) -> Solution:
     position = torch.tensor(_controls_along(problem.start_m, basis.shape[1]), dtype=torch.float32, requires_grad=True)
     offset = torch.zeros_like(position, requires_grad=True)
     terms = _Terms(problem, config, basis)
-    minimise(
-        [position, offset],
-        lambda: {name: value.sum() for name, value in terms(position, offset).items()},
-        config.steps,
-        LEARNING_RATE_M,
-    )
+    if config.steps > 0:
+        minimise(
+            [position, offset],
+            lambda: {name: value.sum() for name, value in terms(position, offset).items()},
+            config.steps,
+            LEARNING_RATE_M,
+        )
     with torch.no_grad(), deterministic_torch():
         final = {name: value.double().numpy() for name, value in terms(position, offset).items()}
         path = terms.tied(position)

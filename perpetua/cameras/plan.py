@@ -60,8 +60,8 @@ class CameraPlan:
 
 
 @dataclass(frozen=True)
-class _Scene:
-    """What all candidates share."""
+class CameraScene:
+    """What all candidates share; ``meshes`` are the actors' once more, for the audit."""
 
     room: Room
     actors: tuple[ActorMesh, ...]
@@ -104,19 +104,16 @@ def plan_cameras(
         CameraError: no candidate of any redraw passes the audit; the message names the rules broken by the best.
     """
     _require_inputs(actors, frames)
-    caster = Caster(join([thing.mesh for thing in room.objects]))
-    field = signed_distance_field(room, caster, config.voxel_m)
-    meshes = tuple(MovingMesh(actor) for actor in actors)
-    scene = _Scene(room, actors, meshes, actor_bounds(actors), caster, field, fps, width_px, height_px)
+    scene = camera_scene(room, actors, config, fps, width_px, height_px)
     nearest: CameraAudit | None = None
     for redraw in range(config.max_redraws + 1):
-        drafts = [_draw(scene, config, seed, redraw, candidate) for candidate in range(config.candidates)]
-        solution = optimise_paths(_pose_problem(scene, drafts, config), config)
+        drafts = [draw_draft(scene, config, seed, redraw, candidate) for candidate in range(config.candidates)]
+        solution = optimise_paths(pose_problem(scene, drafts, config), config)
         for candidate in np.argsort(solution.loss, kind="stable"):
             draft = drafts[candidate]
-            paths = _paths(scene, draft, solution, int(candidate))
-            focus = np.stack([start.focus.members(scene.times_s, len(actors)) for start in draft.starts])
-            audit = audit_paths(paths, focus, room, actors, meshes, caster, fps, config)
+            paths = make_paths(scene, draft, solution, int(candidate))
+            focus = draft.focus(scene)
+            audit = audit_paths(paths, focus, room, actors, scene.meshes, scene.caster, fps, config)
             if audit.passed:
                 terms = {name: float(values[candidate]) for name, values in solution.terms.items()}
                 return CameraPlan(paths, focus, draft.wishes, audit, terms, redraw, int(candidate))
@@ -127,6 +124,16 @@ def plan_cameras(
         f"no camera paths in '{room.name}' keep every rule after {config.max_redraws} redraws "
         f"(cameras.max_redraws); the best set breaks: " + "; ".join(each.message for each in nearest.violations)
     )
+
+
+def camera_scene(
+    room: Room, actors: tuple[ActorMesh, ...], config: CamerasConfig, fps: float, width_px: int, height_px: int
+) -> CameraScene:
+    """Measures the room and its actors, once for all candidates."""
+    caster = Caster(join([thing.mesh for thing in room.objects]))
+    field = signed_distance_field(room, caster, config.voxel_m)
+    meshes = tuple(MovingMesh(actor) for actor in actors)
+    return CameraScene(room, actors, meshes, actor_bounds(actors), caster, field, fps, width_px, height_px)
 
 
 def _require_inputs(actors: tuple[ActorMesh, ...], frames: int) -> None:
@@ -143,21 +150,27 @@ def _require_inputs(actors: tuple[ActorMesh, ...], frames: int) -> None:
 
 
 @dataclass(frozen=True)
-class _Draft:
+class Draft:
     """One candidate before it is optimised."""
 
     wishes: tuple[ViewWish, ...]
     starts: tuple[ViewStart, ...]
 
+    def focus(self, scene: CameraScene) -> Bool[np.ndarray, "C T A"]:
+        """Whom each view is to show at each frame."""
+        return np.stack([start.focus.members(scene.times_s, len(scene.actors)) for start in self.starts])
 
-def _draw(scene: _Scene, config: CamerasConfig, seed: StageSeed, redraw: int, candidate: int) -> _Draft:
+
+def draw_draft(scene: CameraScene, config: CamerasConfig, seed: StageSeed, redraw: int, candidate: int) -> Draft:
+    """Draws what one candidate's views are to be like, and where they start."""
     wishes = draw_wishes(seed, redraw, candidate, scene.room.height_m, config)
     aspect = scene.height_px / scene.width_px
     start_scene = StartScene(scene.field, scene.caster, scene.bounds, float(scene.times_s[-1]), aspect, config)
-    return _Draft(wishes, draw_starts(seed, redraw, candidate, wishes, start_scene))
+    return Draft(wishes, draw_starts(seed, redraw, candidate, wishes, start_scene))
 
 
-def _pose_problem(scene: _Scene, drafts: list[_Draft], config: CamerasConfig) -> Problem:
+def pose_problem(scene: CameraScene, drafts: list[Draft], config: CamerasConfig) -> Problem:
+    """The optimisation of all drafts together."""
     frames = len(scene.times_s)
     duration_s = float(scene.times_s[-1])
     times = max(LEAST_TIMES, int(np.ceil(duration_s * RATE_HZ)) + 1)
@@ -186,7 +199,7 @@ def _pose_problem(scene: _Scene, drafts: list[_Draft], config: CamerasConfig) ->
     )
 
 
-def _focus_m(scene: _Scene, focus: FocusSchedule) -> Float64[np.ndarray, "T 3"]:
+def _focus_m(scene: CameraScene, focus: FocusSchedule) -> Float64[np.ndarray, "T 3"]:
     """The point a view looks at: its focus's chests, smoothed so that steps do not shake the camera."""
     weight = focus.weights(scene.times_s, len(scene.actors))
     point_m = np.einsum("ta,ati->ti", weight, scene.bounds.chest_m)
@@ -199,7 +212,8 @@ def _interpolate(points_m: Float64[np.ndarray, "M 3"], count: int) -> Float64[np
     return np.stack([np.interp(wanted, given, points_m[:, i]) for i in range(3)], axis=1)
 
 
-def _paths(scene: _Scene, draft: _Draft, solution: Solution, candidate: int) -> tuple[CameraPath, ...]:
+def make_paths(scene: CameraScene, draft: Draft, solution: Solution, candidate: int) -> tuple[CameraPath, ...]:
+    """The paths of one candidate at every frame, with their sway."""
     times_s = scene.times_s
     basis = spline_basis(np.linspace(0.0, 1.0, len(times_s)), float(times_s[-1]))
     paths = []
