@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
+from scipy.spatial import cKDTree
 
-from perpetua.actors.bodies.hair import make_hair, scalp_field_m
+from perpetua.actors.bodies.hair import hair_image, make_hair, scalp_field_m
 from perpetua.actors.bodies.makehuman import Traits, base_mesh, shape
 from perpetua.actors.bodies.people import Person, draw_person
-from perpetua.actors.bodies.rig import BoundRig, base_weights, bind, joint_index, relaxed_hands, skin
+from perpetua.actors.bodies.rig import BODY_COUNT, BoundRig, base_weights, bind, joint_index, skin
 from perpetua.actors.bodies.skin import eye_uv, paint_eye, paint_skin, texel_places_m
 from perpetua.actors.bodies.source import BODY_MODELS, Body
 from perpetua.actors.clothing.outfit import Dressed, dress
@@ -24,6 +25,8 @@ from perpetua.seeding import StageSeed
 _BODY_VERTICES = 13380
 # The mouth's inside, by its place among the skin's texture coordinates; it is never seen.
 _MOUTH_UV = (0.74, 0.14)
+_LASHES = tuple(f"helper-{side}-eyelashes-{row}" for side in ("l", "r") for row in (1, 2))
+_LASH_SHARE, _LASH_COLOUR = 0.45, (0.012, 0.009, 0.008)
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class AnnyModel:
     def draw(self, actor: int, config: ActorsConfig, seed: StageSeed) -> Body:
         """The body of one actor of a room."""
         person = draw_person(actor, config, seed)
-        wearer = Wearer(relaxed_hands(_shaped(person)))
+        wearer = Wearer(_shaped(person))
         rng = seed.stream("looks", actor)
         dressed = dress(wearer, person.outfit, seed)
         hair = make_hair(wearer, person.hair, person.complexion.hair, rng)
@@ -89,11 +92,27 @@ def _flesh(wearer: Wearer, person: Person, dressed: Dressed, rng: np.random.Gene
         faces = triangles(mesh.groups[group].faces)
         eye_m = wearer.vertices_m[np.unique(faces)]
         parts.append(ActorPart(f"{side} eye", faces, eye_uv(eye_m, wearer.vertices_m[faces]), eye_material))
+    lashes = triangles(np.concatenate([mesh.groups[name].faces for name in _LASHES]))
+    lash_uv = np.concatenate([mesh.uv[mesh.groups[name].uv_faces] for name in _LASHES])
+    lash_uv = np.concatenate([lash_uv[:, [0, 1, 2]], lash_uv[:, [0, 2, 3]]]).astype(np.float32)
+    dark = Material("eyelashes", _LASH_COLOUR, roughness=0.8, image=hair_image(_LASH_COLOUR, rng))
+    parts.append(ActorPart("eyelashes", lashes, lash_uv, dark))
     weights = base_weights().copy()
-    eyes = np.unique(np.concatenate([part.faces.ravel() for part in parts[1:]]))
-    weights[eyes] = 0.0
-    weights[eyes, joint_index("head")] = 1.0
-    return Piece(wearer.vertices_m, weights, tuple(parts))
+    stiff = np.unique(np.concatenate([part.faces.ravel() for part in parts[1:]]))
+    weights[stiff] = 0.0
+    weights[stiff, joint_index("head")] = 1.0
+    return Piece(_with_short_lashes(wearer.vertices_m, np.unique(lashes)), weights, tuple(parts))
+
+
+def _with_short_lashes(
+    vertices_m: Float64[np.ndarray, "P 3"], lashes: Int32[np.ndarray, " L"]
+) -> Float64[np.ndarray, "P 3"]:
+    """The body with eyelashes of a natural length: MakeHuman's are sheets for pictures of lashes."""
+    skin_m = vertices_m[:_BODY_VERTICES]
+    _, root = cKDTree(skin_m).query(vertices_m[lashes])
+    shortened = vertices_m.copy()
+    shortened[lashes] = skin_m[root] + _LASH_SHARE * (vertices_m[lashes] - skin_m[root])
+    return shortened
 
 
 def _joined(
@@ -129,4 +148,4 @@ def _standing(bound: BoundRig, footing: Footing) -> tuple[Skeleton, BoundRig]:
     origin = np.array([tpose_m[0, 0], tpose_m[0, 1], heel_m[:, 2].mean()])
     contact_m = np.stack([heel_m[0], toe_m[0], heel_m[1], toe_m[1]]) - origin
     joint_m = tpose_m - origin
-    return Skeleton(joint_m, contact_m), BoundRig(bound.rest_joint_m, joint_m, bound.tpose_from_rest)
+    return Skeleton(joint_m[:BODY_COUNT], contact_m), BoundRig(bound.rest_joint_m, joint_m, bound.tpose_from_rest)

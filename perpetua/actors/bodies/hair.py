@@ -191,7 +191,9 @@ def _settle(
     template_m = skull.template_m[near]
     curtain = style.length_m > _LONG_M
     face = curtain & (template_m[:, 0] > 0.07) & (template_m[:, 2] < 0.775) & (template_m[:, 2] > 0.58)
-    aside = np.where(face, np.maximum(0.070 - np.abs(template_m[:, 1]), 0.0), 0.0)
+    # A fringe parts gradually, from the hairline down to the eyes.
+    open_m = np.interp(template_m[:, 2], [0.72, 0.775], [0.068, 0.035])
+    aside = np.where(face, np.maximum(open_m - np.abs(place[:, 1]), 0.0), 0.0)
     place = place + (np.sign(place[:, 1]) * aside)[:, None] * np.array([0.0, 1.0, 0.0])
     _, near = skull.tree.query(place)
     gap = np.sum((place - skull.places_m[near]) * skull.normals[near], axis=1)

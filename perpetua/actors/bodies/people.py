@@ -99,7 +99,7 @@ def draw_person(actor: int, config: ActorsConfig, seed: StageSeed) -> Person:
     youth = (_turn(actor, 4, room) + float(rng.random())) / 4.0
     age_years = round(config.youngest_years + youth * (config.oldest_years - config.youngest_years))
     weight = 0.25 + 0.6 * (_turn(actor, 4, room) + float(rng.random())) / 4.0
-    muscle = float(rng.uniform(0.35, 0.8))
+    muscle = float(rng.uniform(0.32, 0.72))
     mean_m, deviation_m = _STATURE_M[female]
     stature_m = mean_m + deviation_m * float(np.clip(rng.normal(), -1.8, 1.8))
     shares = {"african": 0.08, "asian": 0.08, "european": 0.08, ancestry: 0.84}

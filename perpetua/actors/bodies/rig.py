@@ -10,15 +10,21 @@ from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float32, Float64
+from scipy import sparse
+from scipy.spatial.transform import Rotation
 
+from perpetua.actors.bodies.hands import FINGER_JOINTS, flat_direction, makehuman_bone, parent_of, relaxed_fingers
 from perpetua.actors.bodies.makehuman import VERTEX_COUNT, bone_weights, rig
 from perpetua.actors.types import BODY_JOINTS, BODY_PARENTS, BodyMotion
 
-JOINT_COUNT = len(BODY_JOINTS)
-# Beyond the motion's joints: the lower half of each forearm, which takes half of the hand's twist.
+BODY_COUNT = len(BODY_JOINTS)
+RIG_JOINTS = (*BODY_JOINTS, *FINGER_JOINTS)
+JOINT_COUNT = len(RIG_JOINTS)
+# Beyond the joints: the lower half of each forearm, which takes half of the hand's twist.
 TWISTS = ("left_forearm", "right_forearm")
 BONE_COUNT = JOINT_COUNT + len(TWISTS)
-_INDEX = {name: index for index, name in enumerate((*BODY_JOINTS, *TWISTS))}
+_INDEX = {name: index for index, name in enumerate((*RIG_JOINTS, *TWISTS))}
+_PARENTS = (*BODY_PARENTS, *(_INDEX[parent_of(joint)] for joint in FINGER_JOINTS))
 
 # MakeHuman's bones of each of our joints; the first one's head is the joint. Bones not listed follow their parent.
 _CENTRE_BONES = {
@@ -42,10 +48,6 @@ _SIDE_BONES = {
 }
 
 
-# How far each finger's three segments bend at rest, from the knuckle outward.
-_FINGER_BEND_DEG = {2: (12.0, 22.0, 14.0), 3: (18.0, 26.0, 16.0), 4: (22.0, 28.0, 18.0), 5: (24.0, 28.0, 18.0)}
-
-
 def joint_index(name: str) -> int:
     """Column of a joint or twist bone in skinning weights."""
     return _INDEX[name]
@@ -57,11 +59,11 @@ def _bones_of_joints() -> dict[str, tuple[str, ...]]:
         for word, letter in (("left", "L"), ("right", "R"))
         for joint, bones in _SIDE_BONES.items()
     }
-    return {**_CENTRE_BONES, **sides}
+    return {**_CENTRE_BONES, **sides, **{joint: (makehuman_bone(joint),) for joint in FINGER_JOINTS}}
 
 
 @lru_cache(maxsize=1)
-def base_weights() -> Float64[np.ndarray, "P 24"]:
+def base_weights() -> Float64[np.ndarray, "P 54"]:
     """Skinning weights of the base mesh's vertices for our joints and twist bones; rows sum to 1."""
     joint_of_bone = {bone: _INDEX[joint] for joint, bones in _bones_of_joints().items() for bone in bones}
     parents = {bone.name: bone.parent for bone in rig()}
@@ -79,11 +81,11 @@ def bone_heads(vertices_m: Float64[np.ndarray, "P 3"]) -> Mapping[str, Float64[n
     return {bone.name: vertices_m[list(bone.head_vertices)].mean(axis=0) for bone in rig()}
 
 
-def rest_joints(vertices_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, "22 3"]:
+def rest_joints(vertices_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, "52 3"]:
     """Our joints in a shaped body's MakeHuman rest pose."""
     heads = bone_heads(vertices_m)
     bones = _bones_of_joints()
-    joints = np.stack([heads[bones[name][0]] for name in BODY_JOINTS])
+    joints = np.stack([heads[bones[name][0]] for name in RIG_JOINTS])
     for side, letter in (("left", "L"), ("right", "R")):
         joints[_INDEX[f"{side}_foot"]] = 0.5 * (heads[f"toe2-1.{letter}"] + heads[f"toe3-1.{letter}"])
     return joints
@@ -91,10 +93,7 @@ def rest_joints(vertices_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, "
 
 def rotation_between(start: Float64[np.ndarray, "3"], end: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "3 3"]:
     """The smallest rotation that turns one direction into another that is not its opposite."""
-    a, b = start / np.linalg.norm(start), end / np.linalg.norm(end)
-    axis, cosine = np.cross(a, b), float(a @ b)
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + cosine))
+    return np.asarray(Rotation.align_vectors(end, start)[0].as_matrix())
 
 
 def _frame(forward: Float64[np.ndarray, "3"], up: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "3 3"]:
@@ -104,39 +103,13 @@ def _frame(forward: Float64[np.ndarray, "3"], up: Float64[np.ndarray, "3"]) -> F
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def relaxed_hands(vertices_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, "P 3"]:
-    """The body with its fingers bent a little, as hands that do nothing are; MakeHuman's are stretched."""
-    heads = bone_heads(vertices_m)
-    moved = vertices_m.copy()
-    for letter, sign in (("L", -1.0), ("R", 1.0)):
-        across = sign * (heads[f"finger2-1.{letter}"] - heads[f"finger5-1.{letter}"])
-        across /= np.linalg.norm(across)
-        for finger, bends in _FINGER_BEND_DEG.items():
-            turn, shift_m = np.eye(3), np.zeros(3)
-            for segment, bend in enumerate(bends, start=1):
-                bone = f"finger{finger}-{segment}.{letter}"
-                rotation = _about(across, np.radians(bend))
-                # Composed outward: the segments before have already carried this joint along.
-                shift_m = shift_m + turn @ (heads[bone] - rotation @ heads[bone])
-                turn = turn @ rotation
-                vertices, weights = bone_weights()[bone]
-                offset = vertices_m[vertices] @ turn.T + shift_m - vertices_m[vertices]
-                np.add.at(moved, vertices, weights[:, None] * offset)
-    return moved
-
-
-def _about(axis: Float64[np.ndarray, "3"], angle_rad: float) -> Float64[np.ndarray, "3 3"]:
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle_rad) * cross + (1.0 - np.cos(angle_rad)) * (cross @ cross))
-
-
 @dataclass(frozen=True)
 class BoundRig:
     """A body's joints at rest and in the T-pose; ``tpose_from_rest`` is each joint's rotation between the two."""
 
-    rest_joint_m: Float64[np.ndarray, "22 3"]
-    tpose_joint_m: Float64[np.ndarray, "22 3"]
-    tpose_from_rest: Float64[np.ndarray, "22 3 3"]
+    rest_joint_m: Float64[np.ndarray, "52 3"]
+    tpose_joint_m: Float64[np.ndarray, "52 3"]
+    tpose_from_rest: Float64[np.ndarray, "52 3 3"]
 
 
 def bind(vertices_m: Float64[np.ndarray, "P 3"]) -> BoundRig:
@@ -155,11 +128,26 @@ def bind(vertices_m: Float64[np.ndarray, "P 3"]) -> BoundRig:
         back_of_hand = np.cross(across, fingers) * sign
         level = _frame(out, np.array([0.0, 0.0, 1.0]))
         rotation[_INDEX[f"{side}_wrist"]] = level @ _frame(fingers, back_of_hand).T
+    for finger in FINGER_JOINTS:
+        rotation[_INDEX[finger]] = _flattening(finger, rotation, rest_m)
     tpose_m = rest_m.copy()
-    for joint, parent in enumerate(BODY_PARENTS):
+    for joint, parent in enumerate(_PARENTS):
         if parent >= 0:
             tpose_m[joint] = tpose_m[parent] + rotation[parent] @ (rest_m[joint] - rest_m[parent])
     return BoundRig(rest_m, tpose_m, rotation)
+
+
+def _flattening(
+    joint: str, rotation: Float64[np.ndarray, "52 3 3"], rest_m: Float64[np.ndarray, "52 3"]
+) -> Float64[np.ndarray, "3 3"]:
+    """The rotation of a finger's segment from rest to the flat hand of the T-pose; a tip turns like what carries it."""
+    if joint.endswith("3"):
+        return rotation[_INDEX[parent_of(joint)]]
+    wrist = rotation[_INDEX[f"{joint.split('_')[0]}_wrist"]]
+    following = f"{joint[:-1]}{int(joint[-1]) + 1}"
+    bone = wrist @ (rest_m[_INDEX[following]] - rest_m[_INDEX[joint]])
+    direction = bone / np.linalg.norm(bone)
+    return np.asarray(rotation_between(direction, flat_direction(joint, direction)) @ wrist)
 
 
 def _half_twist(
@@ -168,30 +156,33 @@ def _half_twist(
     axis: Float64[np.ndarray, "3"],
 ) -> Float64[np.ndarray, "T 3 3"]:
     """The upper bone's rotation with half of the lower one's twist about the upper bone's rest ``axis``."""
-    relative = np.swapaxes(world_from_upper, 1, 2) @ world_from_lower
-    # The twist's half angle is that of the quaternion's part along the axis: (w, v.axis).
-    vector = np.stack(
-        [
-            relative[:, 2, 1] - relative[:, 1, 2],
-            relative[:, 0, 2] - relative[:, 2, 0],
-            relative[:, 1, 0] - relative[:, 0, 1],
-        ],
-        axis=1,
-    )
-    half_angle = np.arctan2(vector @ axis, 1.0 + np.trace(relative, axis1=1, axis2=2))
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    sine, cosine = np.sin(half_angle)[:, None, None], np.cos(half_angle)[:, None, None]
-    return np.asarray(world_from_upper @ (np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)))
+    relative = Rotation.from_matrix(np.swapaxes(world_from_upper, 1, 2) @ world_from_lower).as_quat(canonical=True)
+    # The twist's half angle is that of the quaternion's part along the axis: (v.axis, w).
+    half_angle = np.arctan2(relative[:, :3] @ axis, relative[:, 3])
+    return np.asarray(world_from_upper @ Rotation.from_rotvec(half_angle[:, None] * axis).as_matrix())
+
+
+def world_rotations(motion: BodyMotion) -> Float64[np.ndarray, "T 52 3 3"]:
+    """Global rotations of all joints, fingers included."""
+    frames = len(motion.pelvis_m)
+    rotation = np.empty((frames, JOINT_COUNT, 3, 3))
+    rotation[:, :BODY_COUNT] = motion.world_from_joint
+    fingers = motion.finger_from_parent
+    local = np.broadcast_to(relaxed_fingers(), (frames, len(FINGER_JOINTS), 3, 3)) if fingers is None else fingers
+    for finger, joint in enumerate(range(BODY_COUNT, JOINT_COUNT)):
+        rotation[:, joint] = rotation[:, _PARENTS[joint]] @ local[:, finger]
+    return rotation
 
 
 def bone_transforms(
-    bound: BoundRig, world_from_joint: Float64[np.ndarray, "T 22 3 3"], pelvis_m: Float64[np.ndarray, "T 3"]
-) -> tuple[Float64[np.ndarray, "T 24 3 3"], Float64[np.ndarray, "T 24 3"]]:
+    bound: BoundRig, motion: BodyMotion
+) -> tuple[Float64[np.ndarray, "T 54 3 3"], Float64[np.ndarray, "T 54 3"]]:
     """Rotation and translation that take rest-pose points of each bone to the world."""
-    frames = len(pelvis_m)
+    frames = len(motion.pelvis_m)
+    world_from_joint = world_rotations(motion)
     rotation = np.empty((frames, BONE_COUNT, 3, 3))
     rotation[:, :JOINT_COUNT] = world_from_joint @ bound.tpose_from_rest
-    joint_m = world_joints(bound, world_from_joint, pelvis_m)
+    joint_m = world_joints(bound, world_from_joint, motion.pelvis_m)
     rest_m = np.concatenate([bound.rest_joint_m, np.zeros((2, 3))])
     place_m = np.concatenate([joint_m, np.zeros((frames, 2, 3))], axis=1)
     for side in ("left", "right"):
@@ -204,12 +195,12 @@ def bone_transforms(
 
 
 def world_joints(
-    bound: BoundRig, world_from_joint: Float64[np.ndarray, "T 22 3 3"], pelvis_m: Float64[np.ndarray, "T 3"]
-) -> Float64[np.ndarray, "T 22 3"]:
+    bound: BoundRig, world_from_joint: Float64[np.ndarray, "T 52 3 3"], pelvis_m: Float64[np.ndarray, "T 3"]
+) -> Float64[np.ndarray, "T 52 3"]:
     """Where the joints are, by forward kinematics from the T-pose."""
     joint_m = np.empty((len(pelvis_m), JOINT_COUNT, 3))
     joint_m[:, 0] = pelvis_m
-    for joint, parent in enumerate(BODY_PARENTS):
+    for joint, parent in enumerate(_PARENTS):
         if parent >= 0:
             offset = bound.tpose_joint_m[joint] - bound.tpose_joint_m[parent]
             joint_m[:, joint] = joint_m[:, parent] + world_from_joint[:, parent] @ offset
@@ -219,16 +210,17 @@ def world_joints(
 def skin(
     bound: BoundRig,
     vertices_m: Float64[np.ndarray, "P 3"],
-    weights: Float64[np.ndarray, "P 24"],
+    weights: Float64[np.ndarray, "P 54"],
     motion: BodyMotion,
 ) -> Float32[np.ndarray, "T P 3"]:
     """Linear blend skinning of rest-pose vertices."""
     homogeneous = np.concatenate([vertices_m, np.ones((len(vertices_m), 1))], axis=1)
-    rotation, translation = bone_transforms(bound, motion.world_from_joint, motion.pelvis_m)
+    rotation, translation = bone_transforms(bound, motion)
     affine = np.concatenate([rotation, translation[..., None]], axis=3)
     posed = np.empty((len(affine), len(vertices_m), 3), dtype=np.float32)
+    few = sparse.csr_matrix(weights)
     # Frame by frame: memory stays small, and a frame's bits do not depend on how many others there are.
     for frame, bones in enumerate(affine):
-        blended = (weights @ bones.reshape(BONE_COUNT, 12)).reshape(-1, 3, 4)
+        blended = (few @ bones.reshape(BONE_COUNT, 12)).reshape(-1, 3, 4)
         posed[frame] = np.einsum("pab,pb->pa", blended, homogeneous)
     return posed

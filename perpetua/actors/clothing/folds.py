@@ -74,7 +74,7 @@ def top_folds(template_m: Places, arm: Values, long_sleeves: bool, rng: np.rando
         height, [0.05, 0.12, 0.20, 0.30], [0.0, 0.55, 0.45, 0.0]
     )
     mirrored_m = np.stack([template_m[:, 0], np.abs(template_m[:, 1]), height], axis=1)
-    pulled = 1.1 * _fan(mirrored_m, _ARMPIT_M, 7.0, 0.13, rng)
+    pulled = 0.6 * _fan(mirrored_m, _ARMPIT_M, 6.0, 0.11, rng)
     body = (hanging + slumped) * _uneven(template_m, rng) + pulled
     along = along_arm_m(template_m)
     crooked = np.interp(along, [0.05, 0.16, 0.25, 0.34, 0.42], [0.15, 0.5, 1.0, 0.7, 0.55]) if long_sleeves else 0.25

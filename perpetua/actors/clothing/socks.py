@@ -51,6 +51,6 @@ def make_socks(wearer: Wearer, height_m: float, fabric: Fabric) -> Piece:
     inside = np.minimum(sock_field_m(height_m, template_m), template_m[:, 2] - _floor_z_m() - _IN_SHOE_M)
     cut, _ = positive(bare, inside)
     outer_m = cut.vertices_m + _THICKNESS_M * vertex_normals(cut.vertices_m, cut.faces)
-    uv = limbs(cut, ("knee", "ankle"), _LEG_RADIUS_M, (-1.0, 0.0, 0.0)) / np.float32(fabric.tile_m)
+    uv = limbs(cut, ("hip", "knee", "ankle"), _LEG_RADIUS_M, (-1.0, 0.0, 0.0)) / np.float32(fabric.tile_m)
     shade = Material("socks", (0.5, 0.5, 0.5), roughness=fabric.roughness, image=fabric.image)
     return Piece(outer_m, cut.weights, (ActorPart("socks", cut.faces, uv.astype(np.float32), shade),))

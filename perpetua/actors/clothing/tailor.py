@@ -113,7 +113,7 @@ def sew_top(
     sewn = hemmed(outside, field_m, _HEM_M, pattern.thickness_m)
     on_arm = arm_share(_template_weights(sewn, seamed))[sewn.faces].mean(axis=1) > 0.5
     uv = trunk(sewn)
-    uv[on_arm] = limbs(sewn, ("shoulder", "wrist"), _ARM_RADIUS_M, (0.0, -0.7, -0.7))[on_arm]
+    uv[on_arm] = limbs(sewn, ("shoulder", "elbow", "wrist"), _ARM_RADIUS_M, (0.0, -0.7, -0.7))[on_arm]
     shown = np.ones(len(sewn.faces), dtype=bool) if over is None else ~_hidden_by(over, sewn)
     part = ActorPart("top", sewn.faces[shown], uv[shown] / np.float32(fabric.tile_m), _material("top", fabric))
     finished = collar(Piece(sewn.vertices_m, sewn.weights, (part,)), outside, pattern.collar, fabric)
@@ -161,7 +161,7 @@ def sew_trousers(
     folded = replace(seamed, vertices_m=cloth_m)
     weights = _onto(_eased_weights(seamed, 6), {"foot": ("ankle", 1.0), "ankle": ("knee", 0.75)})
     sewn = hemmed(replace(folded, weights=weights), field_m, _HEM_M, pattern.thickness_m)
-    legs = _under(top, sewn, limbs(sewn, ("hip", "ankle"), _LEG_RADIUS_M, (0.1, -1.0, 0.0)), fabric, "trousers")
+    legs = _under(top, sewn, limbs(sewn, ("hip", "knee", "ankle"), _LEG_RADIUS_M, (0.1, -1.0, 0.0)), fabric, "trousers")
     if not pattern.pockets:
         return legs
     outside = replace(folded, weights=weights)

@@ -43,9 +43,9 @@ def around(
 
 
 def limbs(
-    surface: Surface, chain: tuple[str, str], radius_m: float, seam: tuple[float, float, float]
+    surface: Surface, chain: tuple[str, str, str], radius_m: float, seam: tuple[float, float, float]
 ) -> Float32[np.ndarray, "F 3 2"]:
-    """Both sides' limbs unrolled between two joints; a face belongs to the side of the body that it is on.
+    """Both sides' limbs unrolled along three joints; a face belongs to the side of the body that it is on.
 
     ``seam`` points to the left limb's seam; the right one's is its mirror image.
     """
@@ -53,10 +53,26 @@ def limbs(
     uv = np.empty((len(surface.faces), 3, 2), dtype=np.float32)
     left = surface.template_m[surface.faces, 1].mean(axis=1) > 0
     for side, chosen, mirror in (("left", left, 1.0), ("right", ~left, -1.0)):
-        start, end = (joints[joint_index(f"{side}_{name}")] for name in chain)
+        start, bend, end = (joints[joint_index(f"{side}_{name}")] for name in chain)
         towards = np.array(seam) * np.array([1.0, mirror, 1.0])
-        uv[chosen] = around(surface.template_m, surface.faces[chosen], start, end, towards, radius_m)
+        straight_m = _straightened(surface.template_m, start, bend, end)
+        uv[chosen] = around(straight_m, surface.faces[chosen], start, end, towards, radius_m)
     return uv
+
+
+def _straightened(
+    template_m: Float64[np.ndarray, "P 3"],
+    start_m: Float64[np.ndarray, "3"],
+    bend_m: Float64[np.ndarray, "3"],
+    end_m: Float64[np.ndarray, "3"],
+) -> Float64[np.ndarray, "P 3"]:
+    """A bent limb with its bones moved sideways on to the line from its first joint to its last."""
+    length_m = float(np.linalg.norm(end_m - start_m))
+    axis = (end_m - start_m) / length_m
+    at_bend_m = float((bend_m - start_m) @ axis)
+    aside_m = bend_m - start_m - at_bend_m * axis
+    share = np.interp((template_m - start_m) @ axis, [0.0, at_bend_m, length_m], [0.0, 1.0, 0.0])
+    return np.asarray(template_m - share[:, None] * aside_m)
 
 
 def front_m(template_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, " P"]:

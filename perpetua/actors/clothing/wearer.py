@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float64, Int32
 from scipy import sparse
 
+from perpetua.actors.bodies.hands import FINGER_JOINTS
 from perpetua.actors.bodies.makehuman import base_mesh
 from perpetua.actors.bodies.rig import base_weights, joint_index, rest_joints
 from perpetua.actors.clothing.piece import Surface
@@ -29,12 +30,13 @@ def share_of(weights: Float64[np.ndarray, "P J"], joints: tuple[str, ...]) -> Fl
 
 
 def arm_share(weights: Float64[np.ndarray, "P J"]) -> Float64[np.ndarray, " P"]:
-    """How much a vertex belongs to an arm, 0 to 1."""
-    return share_of(weights, _ARM)
+    """How much a vertex belongs to an arm, fingers included, 0 to 1."""
+    fingers = [joint_index(joint) for joint in FINGER_JOINTS]
+    return np.asarray(share_of(weights, _ARM) + weights[:, fingers].sum(axis=1))
 
 
 @lru_cache(maxsize=1)
-def template_joints() -> Float64[np.ndarray, "22 3"]:
+def template_joints() -> Float64[np.ndarray, "52 3"]:
     """Joints of the unshaped base mesh."""
     return rest_joints(base_mesh().vertices_m)
 
