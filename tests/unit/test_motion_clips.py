@@ -170,8 +170,8 @@ def test_words_choose_the_clip(tmp_path: Path, wanted: str, found: str) -> None:
         (tmp_path / name).write_bytes(b"")
     (tmp_path / "index.yaml").write_text("b2.npz: [dancing, twirls]\nwalk_01.npz: walks\n", encoding="utf-8")
     for seed in range(3):
-        assert ranked_clips(clip_files(tmp_path), wanted, np.random.default_rng(seed))[0].name == found
-    drawn = {ranked_clips(clip_files(tmp_path), "swims", np.random.default_rng(seed))[0].name for seed in range(30)}
+        assert ranked_clips(clip_files(tmp_path), wanted, np.random.default_rng(seed))[0][0].name == found
+    drawn = {ranked_clips(clip_files(tmp_path), "swims", np.random.default_rng(seed))[0][0].name for seed in range(30)}
     assert len(drawn) == 3, "without a matching word the seed decides"
 
 

@@ -10,7 +10,7 @@ from perpetua.actors.motion.path import RoutePath
 from perpetua.actors.motion.recorded.body import body_along
 from perpetua.actors.motion.recorded.library import clip_files, load_clip, ranked_clips
 from perpetua.actors.motion.recorded.loop import neutral_pose, standing_part, stretched, walking_part
-from perpetua.actors.motion.recorded.ride import MARGIN_S, going_along, make_clock, ride_along, rows_needed
+from perpetua.actors.motion.recorded.ride import MARGIN_S, Going, going_along, make_clock, ride_along, rows_needed
 from perpetua.actors.motion.recorded.tape import Tape, make_tape
 from perpetua.actors.motion.source import MOTION_SOURCES
 from perpetua.actors.types import BodyMotion, Route, Skeleton
@@ -22,7 +22,9 @@ from perpetua.seeding import StageSeed
 # A body goes where its speed, turns on the spot included, exceeds this.
 _GOING_MPS = 0.13
 # Clips, best match first, that are searched for a part that walks or stands.
-_MOST_TRIED = 24
+_MOST_TRIED = 12
+# Paces whose ratio is within this are one, as a natural logarithm: three quarters to four thirds.
+_SAME_PACE = 0.29
 
 
 @dataclass(frozen=True)
@@ -37,9 +39,9 @@ class _Chosen:
 class ClipMotion:
     """Cuts, loops, retimes and bends a recorded clip along the route, and plants its feet.
 
-    The clip whose file name or index entry shares most words with the route's description is taken, else one drawn by
-    the seed. Its longest walk carries the body along the route; its standing part, else that of the next clip that has
-    one, is played while the route pauses.
+    The clip whose file name or index entry shares most words with the route's description is taken; of several, one
+    drawn by the seed that walks about as fast as the route goes. Its longest walk carries the body along the route; its
+    standing part, if it has one, is played while the route pauses.
     """
 
     def make(
@@ -53,9 +55,8 @@ class ClipMotion:
         from_start = config.clips.from_start
         clock = make_clock(len(route.heading_rad), fps, 0.0 if from_start else MARGIN_S)
         going = going_along(RoutePath(route, fps), clock)
-        goes = bool((going.speed_mps > _GOING_MPS).any())
         rng = seed.stream("clips", route.actor)
-        chosen = _choose(route, goes, skeleton, config.clips, rng)
+        chosen = _choose(route, going, skeleton, config.clips, rng)
         part = chosen.walking if chosen.walking is not None else chosen.standing
         if part is None:
             raise AssetError(_nothing_fits(config.clips, "stands or walks"))
@@ -71,19 +72,33 @@ def clip_folder(config: ClipsConfig) -> Path:
     return Path(config.folder).expanduser() if config.folder else asset_folder() / "motion" / "clips"
 
 
-def _choose(route: Route, goes: bool, skeleton: Skeleton, config: ClipsConfig, rng: np.random.Generator) -> _Chosen:
-    ranked = ranked_clips(clip_files(clip_folder(config)), route.description, rng)[:_MOST_TRIED]
+def _choose(route: Route, going: Going, skeleton: Skeleton, config: ClipsConfig, rng: np.random.Generator) -> _Chosen:
+    goes = going.speed_mps[going.speed_mps > _GOING_MPS]
+    wanted_mps = float(np.median(goes)) if len(goes) > 0 else None
     walking: Tape | None = None
     standing: Tape | None = None
-    for path in ranked:
-        tape = make_tape(load_clip(path, config.up), skeleton)
-        walking = walking_part(tape) if walking is None else walking
-        standing = standing_part(tape) if standing is None else standing
-        if (walking is not None or not goes) and (standing is not None or walking is not None):
+    tried = 0
+    for group in ranked_clips(clip_files(clip_folder(config)), route.description, rng):
+        tapes = [make_tape(load_clip(path, config.up), skeleton) for path in group[: _MOST_TRIED - tried]]
+        tried += len(tapes)
+        walking = _nearest_pace(tapes, wanted_mps) if walking is None else walking
+        standing = next(filter(None, map(standing_part, tapes)), None) if standing is None else standing
+        if (walking is not None or (wanted_mps is None and standing is not None)) or tried >= _MOST_TRIED:
             break
-    if goes and walking is None:
+    if wanted_mps is not None and walking is None:
         raise AssetError(_nothing_fits(config, "walks for a second, and the route of an actor does"))
     return _Chosen(walking, standing)
+
+
+def _nearest_pace(tapes: list[Tape], wanted_mps: float | None) -> Tape | None:
+    """The first that walks about as fast as wanted, else the one that does so most nearly; None if none walks."""
+    walks = [walk for walk in map(walking_part, tapes) if walk is not None]
+    if wanted_mps is None or not walks:
+        return walks[0] if walks else None
+    apart = [abs(float(np.log(np.median(walk.speed_mps) / wanted_mps))) for walk in walks]
+    return next(
+        (walk for walk, ratio in zip(walks, apart, strict=True) if ratio < _SAME_PACE), walks[int(np.argmin(apart))]
+    )
 
 
 def _nothing_fits(config: ClipsConfig, what: str) -> str:

@@ -1,5 +1,7 @@
 """A tape's motion laid along a route, feet planted, as a ``BodyMotion``."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float64
 from scipy.ndimage import gaussian_filter1d
@@ -18,6 +20,7 @@ from perpetua.actors.types import BodyMotion, Skeleton
 _STRIDE_FROM_MPS, _STRIDE_TO_MPS = 0.12, 0.35
 # A recorded pelvis may be this far from its path, softly.
 _MOST_OFFSET_M = 0.1
+_MOST_LONGER = 1.5
 _AHEAD = np.array([1.0, 0.0, 0.0])
 
 
@@ -49,15 +52,15 @@ def body_along(
     away_m = _softly(posed.offset_m[:, :2])
     pelvis_m = going.place_m + np.einsum("nij,nj->ni", yaw, np.column_stack([away_m, posed.offset_m[:, 2]]))
     pelvis_m[:, 2] += _soft_floor_m(going, clock) - going.place_m[:, 2]
-    ankle_m = _strides(tape, ride, going, skeleton)
+    strides = _strides(tape, ride, going, skeleton)
     feet: list[FootTrack] = []
     for foot, side in enumerate(SIDES):
         wanted = WantedFoot(
-            going.place_m + np.einsum("nij,nj->ni", yaw, ankle_m[:, foot]),
+            going.place_m + np.einsum("nij,nj->ni", yaw, strides.ankle_m[:, foot]),
             world_from_joint[:, joint_index(f"{side}_ankle")],
             world_from_joint[:, joint_index(f"{side}_foot")],
             _at_rows(tape.standing[:, foot], ride.row),
-            ride.stands,
+            (1.0 - ride.stands) * strides.longer,
         )
         feet.append(plant_foot(wanted, foot_of(skeleton, side), going.place_m[:, 2]))
     legs = (leg_of(skeleton, "left"), leg_of(skeleton, "right"))
@@ -138,7 +141,15 @@ def _soft_floor_m(going: Going, clock: Clock) -> Float64[np.ndarray, " N"]:
     return np.asarray(gaussian_filter1d(going.place_m[:, 2], 0.15 / clock.step_s, mode="nearest"))
 
 
-def _strides(tape: Tape, ride: Ride, going: Going, skeleton: Skeleton) -> Float64[np.ndarray, "N 2 3"]:
+@dataclass(frozen=True)
+class _Strides:
+    """Ankles about the path, and how much longer than recorded the strides are (1 if not longer)."""
+
+    ankle_m: Float64[np.ndarray, "N 2 3"]
+    longer: Float64[np.ndarray, " N"]
+
+
+def _strides(tape: Tape, ride: Ride, going: Going, skeleton: Skeleton) -> _Strides:
     """Ankles about the path, strides turned and stretched to the route's velocity.
 
     A foot that stands goes backwards in the frame of the path as fast as the path goes. The part of a foot's place
@@ -156,7 +167,7 @@ def _strides(tape: Tape, ride: Ride, going: Going, skeleton: Skeleton) -> Float6
     for foot in (0, 1):
         ahead_m = np.sum((ankle_m[:, foot, :2] - middle_m) * along, axis=1)
         ankle_m[:, foot, :2] += (share * ahead_m)[:, None] * (stride - along)
-    return ankle_m
+    return _Strides(ankle_m, np.clip(np.linalg.norm(stride, axis=1), 1.0, _MOST_LONGER))
 
 
 def _enter_legs(

@@ -79,15 +79,21 @@ def _stem(word: str) -> str:
     return word
 
 
-def ranked_clips(files: dict[Path, frozenset[str]], description: str, rng: np.random.Generator) -> list[Path]:
-    """Clips by how many of the description's words describe them, fewest further words first, ties as drawn."""
+def ranked_clips(
+    files: dict[Path, frozenset[str]], description: str, rng: np.random.Generator
+) -> list[tuple[Path, ...]]:
+    """Clips in groups that fit equally well, best first; the order within a group is drawn.
+
+    A clip fits by how many of the description's words describe it, then by how few further words do.
+    """
     wanted = action_words(description)
-    drawn = rng.permutation(len(files))
-    shared = [len(wanted & words) for words in files.values()]
-    further = [len(words - wanted) if hits > 0 else 0 for hits, words in zip(shared, files.values(), strict=True)]
-    order = sorted(range(len(files)), key=lambda index: (-shared[index], further[index], drawn[index]))
+    groups: dict[tuple[int, int], list[Path]] = {}
     paths = list(files)
-    return [paths[index] for index in order]
+    for index in rng.permutation(len(paths)):
+        words = files[paths[index]]
+        shared = len(wanted & words)
+        groups.setdefault((-shared, len(words - wanted) if shared > 0 else 0), []).append(paths[index])
+    return [tuple(groups[fit]) for fit in sorted(groups)]
 
 
 def load_clip(path: Path, up: str) -> Clip:
@@ -103,6 +109,6 @@ def load_clip(path: Path, up: str) -> Clip:
     return _load_once(path, stat.st_mtime_ns, stat.st_size, up)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=32)
 def _load_once(path: Path, mtime_ns: int, size: int, up: str) -> Clip:
     return _READERS[path.suffix.lower()](path, up)

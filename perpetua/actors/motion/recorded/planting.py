@@ -22,14 +22,15 @@ _SWING_CLEARANCE_M = 0.012
 class WantedFoot:
     """Where a foot would be if nothing held it: the ankle, and the foot's and the toes' world rotation.
 
-    ``rests`` says how much of its pitch it has to lose (0 to 1) because the body waits in the middle of a stride.
+    ``pitch_scale`` multiplies its pitch: less than 1 where the body waits in the middle of a stride, more where
+    strides are longer than recorded.
     """
 
     ankle_m: Float64[np.ndarray, "N 3"]
     world_from_foot: Float64[np.ndarray, "N 3 3"]
     world_from_toes: Float64[np.ndarray, "N 3 3"]
     stands: Bool[np.ndarray, " N"]
-    rests: Float64[np.ndarray, " N"]
+    pitch_scale: Float64[np.ndarray, " N"]
 
 
 @dataclass(frozen=True)
@@ -79,8 +80,7 @@ def _angles(wanted: WantedFoot) -> _Angles:
     if middles:
         lie_rad = float(np.median(np.concatenate([pitch_rad[middle] for middle in middles])))
         pitch_rad, toe_pitch_rad = pitch_rad - lie_rad, toe_pitch_rad - lie_rad
-    kept = 1.0 - wanted.rests
-    return _Angles(yaw_rad, kept * pitch_rad, kept * toe_pitch_rad)
+    return _Angles(yaw_rad, wanted.pitch_scale * pitch_rad, wanted.pitch_scale * toe_pitch_rad)
 
 
 def _pitch_rad(ahead: Float64[np.ndarray, "N 3"], yaw_rad: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:

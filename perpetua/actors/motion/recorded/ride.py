@@ -20,8 +20,12 @@ _LONGEST_STRIDE, _LONGEST_SIDE_STRIDE = 1.6, 0.22
 _HOLD_BLEND_S = 0.5
 # Below this speed a step hardly goes ahead, so a foot that has landed need not be put beside the other.
 _SLOW_MPS = 0.5
-# A body that has stopped puts its feet together this quickly, in the tape's own speed.
-_CLOSING_RATE = 1.2
+# A body that stops puts its feet together, and one that sets off takes its first step, at this rate of the tape; it
+# sets off a little before its path does.
+_STEPPING_RATE = 1.2
+_SETTING_OFF_S, _FORESIGHT_S = 0.8, 0.25
+# Where in the time in which both feet stand a body waits: near its end, so that a step can follow at once.
+_WAITS_AT = 0.8
 
 
 @dataclass(frozen=True)
@@ -122,7 +126,8 @@ def _holds(going: Going, clock: Clock) -> dict[int, _Hold]:
         place_m = going.place_m[start:end, :2]
         near = np.linalg.norm(place_m - place_m[len(place_m) // 2], axis=1).max() < _STILL_M
         if near and (end - start) * clock.step_s >= _LEAST_HOLD_S:
-            holds[start] = _Hold(start, end, next(first for first, last in slow if first <= start < last))
+            until = end - round(_FORESIGHT_S / clock.step_s) if end < len(going.speed_mps) else end
+            holds[start] = _Hold(start, until, next(first for first, last in slow if first <= start < last))
     return holds
 
 
@@ -140,8 +145,8 @@ def _rate(terms: Float64[np.ndarray, "3"], tape_mps: float) -> float:
 
 
 def _double_support(tape: Tape) -> Float64[np.ndarray, " K"]:
-    """Rows in the middle of the times in which both feet stand."""
-    return np.array([0.5 * (start + end - 1) for start, end in runs(tape.standing.all(axis=1))])
+    """Rows at which a body can wait, as both feet stand."""
+    return np.array([start + _WAITS_AT * (end - 1 - start) for start, end in runs(tape.standing.all(axis=1))])
 
 
 def _integrate(
@@ -156,7 +161,8 @@ def _integrate(
     count, last = len(terms), len(tape) - 1
     row, at = np.empty(count), 0.0
     stops: list[tuple[int, int]] = []
-    target, release = np.inf, 0
+    target, release = np.inf, -count
+    setting_off = round(_SETTING_OFF_S / clock.step_s)
     for tick in range(count):
         if tick in holds:
             release = holds[tick].end
@@ -166,7 +172,8 @@ def _integrate(
             target = np.inf
         row[tick] = at
         rate = _rate(terms[tick], float(speeds[min(int(at), last)]))
-        going_on = max(rate, _CLOSING_RATE) if np.isfinite(target) else rate
+        steps = np.isfinite(target) or 0 <= tick - release < setting_off
+        going_on = max(rate, _STEPPING_RATE) if steps else rate
         following = min(at + going_on * clock.step_s * TAPE_HZ, last)
         if following >= target:
             stops = stops if stops and stops[-1][1] == release else [*stops, (tick, release)]
