@@ -10,6 +10,7 @@ from perpetua.actors.assembly import assemble_actors, draw_bodies
 from perpetua.actors.bodies.source import Body
 from perpetua.actors.casting import action_descriptions
 from perpetua.actors.config import ActorsConfig
+from perpetua.actors.motion.clips import clip_listing
 from perpetua.actors.motion.plan import make_motions
 from perpetua.actors.routes import plan_routes
 from perpetua.actors.types import ActorMesh, BodyMotion, Route
@@ -172,6 +173,11 @@ def _route_settings(config: Config) -> dict[str, Any]:
     return {**_settings("actors.count", "actors.routes", _FRAMES, _FPS)(config), "descriptions": descriptions}
 
 
+def _motion_settings(config: Config) -> dict[str, Any]:
+    """A folder of clips counts by what is in it."""
+    return {**_settings("actors", _FPS)(config), "clips": clip_listing(config.actors.motion)}
+
+
 def _motion(context: StageContext) -> tuple[BodyMotion, ...]:
     skeletons = tuple(body.skeleton for body in _bodies(context))
     routes = context.many("routes", Route)
@@ -310,7 +316,7 @@ STAGES = (
         _routes,
         redraw=_every_time,
     ),
-    Stage(40, "motion", 1, ("room", "routes"), _settings("actors", _FPS), _motion),
+    Stage(40, "motion", 1, ("room", "routes"), _motion_settings, _motion),
     Stage(50, "actors", 1, ("room", "routes", "motion"), _settings("actors", _FPS), _actors),
     Stage(
         60,

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from perpetua.actors.config import ClipsConfig, MotionConfig
 from perpetua.actors.motion import MOTION_SOURCES
+from perpetua.actors.motion.clips import clip_listing
 from perpetua.actors.motion.kinematics import contact_positions
 from perpetua.actors.motion.recorded import archive
 from perpetua.actors.motion.recorded.amass import read_amass
@@ -202,6 +203,17 @@ def test_a_folder_without_clips_and_a_clip_that_only_stands_say_so(tmp_path: Pat
     _check_locked(_make(route, tmp_path))
     with pytest.raises(AssetError, match="add a clip of somebody walking"):
         _make(sample_route("curve", FPS), tmp_path)
+
+
+def test_a_changed_folder_is_other_input_of_the_motion_stage(tmp_path: Path) -> None:
+    config = MotionConfig(source="clips", clips=ClipsConfig(folder=str(tmp_path)))
+    listings = [clip_listing(config)]
+    (tmp_path / "walk.npz").write_bytes(b"1")
+    listings.append(clip_listing(config))
+    (tmp_path / "walk.npz").write_bytes(b"22")
+    listings.append(clip_listing(config))
+    assert [len(listing) for listing in listings] == [0, 1, 1] and listings[1] != listings[2]
+    assert clip_listing(MotionConfig()) == []
 
 
 class _Trap:

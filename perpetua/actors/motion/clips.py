@@ -72,6 +72,15 @@ def clip_folder(config: ClipsConfig) -> Path:
     return Path(config.folder).expanduser() if config.folder else asset_folder() / "motion" / "clips"
 
 
+def clip_listing(config: MotionConfig) -> list[str]:
+    """Name, size and time of change of all that the source may read; empty for other sources or without a folder."""
+    folder = clip_folder(config.clips)
+    if config.source != "clips" or not folder.is_dir():
+        return []
+    stats = {path.relative_to(folder).as_posix(): path.stat() for path in folder.rglob("*") if path.is_file()}
+    return [f"{name} {stat.st_size} {stat.st_mtime_ns}" for name, stat in sorted(stats.items())]
+
+
 def _choose(route: Route, going: Going, skeleton: Skeleton, config: ClipsConfig, rng: np.random.Generator) -> _Chosen:
     goes = going.speed_mps[going.speed_mps > _GOING_MPS]
     wanted_mps = float(np.median(goes)) if len(goes) > 0 else None
