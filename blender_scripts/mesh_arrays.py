@@ -44,8 +44,13 @@ def add_image_uv(mesh: bpy.types.Mesh, uv: np.ndarray) -> None:
 
 def add_pattern_uv(mesh: bpy.types.Mesh, vertices_m: np.ndarray, faces: np.ndarray) -> None:
     """The UV layer that patterns use: metres in the plane that each triangle faces most, V up on walls."""
+    set_pattern_uv(mesh, box_projection(vertices_m, faces))
+
+
+def set_pattern_uv(mesh: bpy.types.Mesh, uv_m: np.ndarray) -> None:
+    """The UV layer that patterns use, from metres f[F, 3, 2]."""
     layer = mesh.uv_layers.new(name=PATTERN_UV)
-    layer.uv.foreach_set("vector", box_projection(vertices_m, faces).astype(np.float32).ravel())
+    layer.uv.foreach_set("vector", np.ascontiguousarray(uv_m, np.float32).ravel())
 
 
 def box_projection(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.navigation.types import NavGrid
 from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import AreaLight, Material, Room, SceneObject
+from perpetua.rooms.types import AreaLight, Material, Room, SceneObject, Sky
 from perpetua.tracks.types import PointTracks, SequenceTracks, SightReport, ViewTracks
 
 VALUE_FILE = "value.json"
@@ -30,7 +30,7 @@ STORED_TYPES = {
     stored.__name__: stored
     for stored in (
         ActorMesh, ActorPart, AreaLight, BodyMotion, CameraPath, Dwell, Intrinsics, Material, NavGrid, PointTracks,
-        RenderedView, Room, Route, SceneObject, SequenceTracks, SightReport, TriMesh, ViewTracks,
+        RenderedView, Room, Route, SceneObject, SequenceTracks, Sky, SightReport, TriMesh, ViewTracks,
     )
 }  # fmt: skip
 

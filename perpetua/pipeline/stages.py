@@ -299,7 +299,7 @@ STAGES = (
     Stage(
         10,
         "room",
-        1,
+        2,
         (),
         _room_settings,
         _room,

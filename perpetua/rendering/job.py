@@ -3,6 +3,7 @@
 A file of arrays is named after its content, so job.json alone says whether two jobs are the same.
 """
 
+import dataclasses
 import hashlib
 import json
 import shutil
@@ -101,6 +102,7 @@ def _room_settings(room: Room, writer: _ArrayWriter) -> Settings:
     return {
         "objects": [_object_settings(thing, writer) for thing in room.objects],
         "lights": [_light_settings(light) for light in room.lights],
+        "sky": None if room.sky is None else dataclasses.asdict(room.sky),
     }
 
 

@@ -8,14 +8,20 @@ from jaxtyping import Float64, UInt8
 
 from perpetua.geometry.mesh import TriMesh
 
+PATTERNS = (
+    "plain", "wood", "planks", "fabric", "velvet", "tile", "bricks", "plaster", "marble", "terrazzo", "brushed",
+    "wicker", "checks", "stripes", "wallpaper",
+)  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Material:
     """A surface that is cheap to render: one colour, a node pattern, or an image through the mesh's UVs.
 
-    ``base_color`` and ``second_color`` are linear RGB in [0, 1]. ``pattern`` is one of "plain", "wood", "fabric",
-    "tile", "plaster", "marble", "checks", "stripes"; ``scale_m`` is the size of its repeat in metres. ``image`` is an
-    sRGB texture (row 0 on top); it replaces colour and pattern. ``emission_w_m2`` > 0 makes the surface a lamp.
+    ``base_color`` and ``second_color`` are linear RGB in [0, 1]. ``pattern`` is one of ``PATTERNS``; ``scale_m`` is
+    the size of its repeat in metres. ``image`` is an sRGB texture (row 0 on top); it replaces colour and pattern. On
+    a room's object it repeats every ``scale_m``, or covers the object once where that is 0. ``emission_w_m2`` > 0
+    makes the surface a lamp.
     """
 
     name: str
@@ -41,6 +47,16 @@ class AreaLight:
 
 
 @dataclass(frozen=True)
+class Sky:
+    """What lies outside the windows: a gradient without depth; colours are linear RGB, radiance that of white."""
+
+    zenith_color: tuple[float, float, float]
+    horizon_color: tuple[float, float, float]
+    ground_color: tuple[float, float, float]
+    radiance_w_m2_sr: float
+
+
+@dataclass(frozen=True)
 class SceneObject:
     """One rendered thing of a room, exactly as rendered.
 
@@ -60,7 +76,10 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class Room:
-    """A furnished room. World origin on the floor (z = 0) under the middle of ``floor_polygon_m``."""
+    """A furnished room. World origin on the floor (z = 0) under the middle of ``floor_polygon_m``'s bounding box.
+
+    ``sky`` is None where the room's .blend carries it, or where a plain day will do.
+    """
 
     name: str
     kind: str
@@ -69,6 +88,7 @@ class Room:
     objects: tuple[SceneObject, ...]
     lights: tuple[AreaLight, ...]
     blend_path: Path | None
+    sky: Sky | None = None
 
     @property
     def next_object_index(self) -> int:

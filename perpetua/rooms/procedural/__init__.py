@@ -1,4 +1,4 @@
-"""Own furnished rooms, from boxes and turned parts by rules; no Blender, less than a second."""
+"""Own furnished rooms, from bevelled, turned and soft parts by rules; no Blender, less than a second."""
 
 from pathlib import Path
 

@@ -1,178 +1,161 @@
-"""Lamps, plants, pictures, cloth and small things, in each piece's own frame."""
+"""What hangs on walls or lies on floors, in each piece's own frame."""
 
 import numpy as np
 
 from perpetua.geometry.mesh import TriMesh, join
-from perpetua.rooms.procedural.palette import Palette
-from perpetua.rooms.procedural.parts import Part, bar, block, folds, hull, lathe, post
+from perpetua.rooms.procedural.palette import PICTURES, Palette
+from perpetua.rooms.procedural.parts import Part, bar, block, lathe, moved, post, tube
 from perpetua.rooms.procedural.plan import Piece
+from perpetua.rooms.procedural.soft import curtain
 
-Profile = list[tuple[float, float]]
 
-
-def build_lamp(piece: Piece, palette: Palette) -> list[Part]:
-    """A table or floor lamp: foot, stem and a glowing shade."""
-    width, depth, height = piece.size_m
-    radius, centre = 0.5 * width, (0.0, 0.5 * depth)
-    shade_height = min(0.28, 0.5 * height)
-    base = height - shade_height
-    if height > 0.9:
-        stand = [post(centre, 0.7 * radius, 0.0, 0.025, 24), post(centre, 0.012, 0.02, base + 0.1)]
-    else:
-        belly: Profile = [(0.0, 0.0), (0.5 * radius, 0.0), (0.62 * radius, 0.35 * base), (0.25 * radius, 0.8 * base)]
-        stand = [
-            lathe([*belly, (0.1 * radius, base), (0.0, base)], centre),
-            post(centre, 0.008, base - 0.01, base + 0.1),
+def frame(width_m: float, height_m: float, depth_m: float, edge_m: float) -> TriMesh:
+    """Four bevelled bars around a rectangle that stands on z = 0 with its back on y = 0."""
+    half = 0.5 * width_m
+    return join(
+        [
+            block((-half, 0.0, 0.0), (half, depth_m, edge_m), 0.005),
+            block((-half, 0.0, height_m - edge_m), (half, depth_m, height_m), 0.005),
+            block((-half, 0.0, edge_m - 0.003), (-half + edge_m, depth_m, height_m - edge_m + 0.003), 0.005),
+            block((half - edge_m, 0.0, edge_m - 0.003), (half, depth_m, height_m - edge_m + 0.003), 0.005),
         ]
-    shade = lathe(
-        [(0.0, base), (radius, base), ((0.6 + 0.3 * piece.detail[0]) * radius, height), (0.0, height)], centre, 28
     )
-    material = palette.metal if piece.detail[1] < 0.5 else palette.accents[int(5 * piece.detail[2])]
-    return [Part("", join(stand), material), Part("shade", shade, palette.lamp_shade)]
-
-
-def build_ceiling_lamp(piece: Piece, palette: Palette) -> list[Part]:
-    """A flat dish under the ceiling; the piece's top is the ceiling."""
-    radius, height = 0.5 * piece.size_m[0], piece.size_m[2]
-    centre = (0.0, 0.5 * piece.size_m[1])
-    dish = lathe(
-        [(0.0, 0.0), (0.7 * radius, 0.01), (radius, 0.05), (radius, height - 0.02), (0.0, height - 0.02)], centre, 32
-    )
-    return [
-        Part("", dish, palette.lamp_shade),
-        Part("mount", post(centre, 0.8 * radius, height - 0.02, height, 24), palette.metal),
-    ]
-
-
-def build_pendant(piece: Piece, palette: Palette) -> list[Part]:
-    """A lamp on a cord from the ceiling; the piece's top is the ceiling."""
-    radius, height = 0.5 * piece.size_m[0], piece.size_m[2]
-    centre = (0.0, 0.5 * piece.size_m[1])
-    shade: Profile = [(0.0, 0.0), (0.9 * radius, 0.0), (radius, 0.02), (0.45 * radius, 0.20), (0.1, 0.24), (0.0, 0.24)]
-    cord = [post(centre, 0.006, 0.23, height - 0.02, 8), post(centre, 0.05, height - 0.02, height)]
-    return [Part("", lathe(shade, centre, 30), palette.lamp_shade), Part("cord", join(cord), palette.black)]
-
-
-def build_plant(piece: Piece, palette: Palette) -> list[Part]:
-    """A pot with leaves that arch outwards from the middle."""
-    width, depth, height = piece.size_m
-    reach, centre = 0.5 * min(width, depth), np.array([0.0, 0.5 * depth])
-    pot_height = min(0.32, 0.34 * height)
-    pot_radius = min(0.6 * reach, 0.17)
-    pot: Profile = [(0.0, 0.0), (0.72 * pot_radius, 0.0), (pot_radius, pot_height), (0.9 * pot_radius, pot_height)]
-    pot += [(0.88 * pot_radius, pot_height - 0.02), (0.0, pot_height - 0.02)]
-    soil_z = pot_height - 0.025
-    leaves = [
-        _leaf(centre, soil_z, height, reach, 2.4 * index, piece.detail[index % len(piece.detail)])
-        for index in range(14)
-    ]
-    place = (float(centre[0]), float(centre[1]))
-    soil = post(place, 0.86 * pot_radius, soil_z, pot_height - 0.005)
-    return [
-        Part("", lathe(pot, place, 24), palette.accents[int(5 * piece.detail[0])]),
-        Part("soil", soil, palette.soil),
-        Part("leaves", join([mesh for leaf in leaves for mesh in leaf]), palette.leaf),
-    ]
-
-
-def _leaf(
-    centre: np.ndarray, soil_z: float, height: float, reach: float, angle: float, detail: float
-) -> tuple[TriMesh, TriMesh]:
-    """A stalk from the soil and a flat pointed blade at its end."""
-    outward = np.array([np.cos(angle), np.sin(angle)])
-    side = np.array([-outward[1], outward[0]])
-    rise = (0.45 + 0.5 * detail) * (height - soil_z)
-    joint = np.append(centre + (0.25 + 0.25 * (1 - detail)) * reach * outward, soil_z + 0.6 * rise)
-    tip = np.append(centre + (0.7 + 0.28 * (1 - detail)) * reach * outward, soil_z + rise)
-    middle = 0.5 * (joint + tip) + np.array([0.0, 0.0, 0.08 * height])
-    half = 0.13 * reach + 0.02
-    edge = np.append(half * side, 0.0)
-    thick = np.array([0.0, 0.0, 0.004])
-    blade = np.stack([joint, joint + thick, middle - edge, middle + edge, middle + 2 * thick, tip, tip + thick])
-    root = np.append(centre + 0.02 * outward, soil_z)
-    stalk = bar((root[0], root[1], root[2]), (joint[0], joint[1], joint[2] + 0.002), 0.006, 6)
-    return stalk, hull(blade)
 
 
 def build_picture(piece: Piece, palette: Palette) -> list[Part]:
-    """A framed picture or, by its category, a mirror."""
+    """A framed print or, by its category, a mirror."""
     width, depth, height = piece.size_m
-    half, edge = 0.5 * width, 0.03
-    frame = [
-        block((-half, 0.0, 0.0), (half, depth, edge)),
-        block((-half, 0.0, height - edge), (half, depth, height)),
-        block((-half, 0.0, edge), (-half + edge, depth, height - edge)),
-        block((half - edge, 0.0, edge), (half, depth, height - edge)),
+    mirror = piece.category == "mirror"
+    edge = 0.022 + 0.02 * piece.detail[2]
+    half = 0.5 * width
+    inner = block((-half + 0.5 * edge, 0.0, 0.5 * edge), (half - 0.5 * edge, 0.55 * depth, height - 0.5 * edge), 0.0005)
+    face = palette.mirror if mirror else palette.pictures[int(PICTURES * piece.detail[0])]
+    rim = (palette.black, palette.wood, palette.trim, palette.dark_wood, palette.warm_metal)[int(5 * piece.detail[1])]
+    return [Part("", inner, face), Part("frame", frame(width, height, depth, edge), rim)]
+
+
+def build_round_mirror(piece: Piece, palette: Palette) -> list[Part]:
+    """A round mirror on the wall."""
+    width, depth, height = piece.size_m
+    radius = 0.5 * min(width, height)
+    middle = (0.0, 0.0, 0.5 * height)
+    glass = bar((0.0, 0.0, middle[2]), (0.0, 0.55 * depth, middle[2]), 0.97 * radius, 40)
+    angles = np.linspace(0.0, 2 * np.pi, 49)
+    ring = [
+        (0.965 * radius * float(np.cos(a)), 0.5 * depth, middle[2] + 0.965 * radius * float(np.sin(a))) for a in angles
     ]
-    inner = block((-half + edge, 0.0, edge), (half - edge, 0.6 * depth, height - edge), 0.001)
-    face = palette.mirror if piece.category == "mirror" else palette.pictures[int(4 * piece.detail[0])]
+    rim = tube(ring, 0.035 * radius, 8)
+    return [Part("", glass, palette.mirror), Part("frame", rim, palette.handle)]
+
+
+def build_clock(piece: Piece, palette: Palette) -> list[Part]:
+    """A round wall clock; its details settle the time."""
+    width, depth, height = piece.size_m
+    radius, z = 0.5 * width, 0.5 * height
+    body = bar((0.0, 0.0, z), (0.0, 0.8 * depth, z), radius, 36)
+    face = bar((0.0, 0.7 * depth, z), (0.0, 0.85 * depth, z), 0.88 * radius, 36)
+    marks = []
+    for hour in range(12):
+        angle, long = 2 * np.pi * hour / 12, 0.14 if hour % 3 == 0 else 0.07
+        inner, outer = (0.80 - long) * radius, 0.80 * radius
+        x, h = float(np.sin(angle)), float(np.cos(angle))
+        marks.append(bar((inner * x, 0.86 * depth, z + inner * h), (outer * x, 0.86 * depth, z + outer * h), 0.004, 6))
+    for share, length, thick in ((piece.detail[0], 0.42, 0.006), ((12 * piece.detail[0]) % 1.0, 0.66, 0.0045)):
+        x, h = float(np.sin(2 * np.pi * share)), float(np.cos(2 * np.pi * share))
+        marks.append(bar((0.0, 0.9 * depth, z), (length * radius * x, 0.9 * depth, z + length * radius * h), thick, 6))
     rim = palette.black if piece.detail[1] < 0.5 else palette.wood
-    return [Part("", inner, face), Part("frame", join(frame), rim)]
+    return [Part("", body, rim), Part("face", face, palette.paper), Part("hands", join(marks), palette.black)]
 
 
 def build_rug(piece: Piece, palette: Palette) -> list[Part]:
     """A flat rug."""
     half, depth, height = 0.5 * piece.size_m[0], piece.size_m[1], piece.size_m[2]
+    if piece.size_m[0] == depth:
+        return [Part("", post((0.0, half), half, 0.0, height, 48, 0.003), palette.rug)]
     return [Part("", block((-half, 0.0, 0.0), (half, depth, height), 0.004), palette.rug)]
 
 
 def build_curtain(piece: Piece, palette: Palette) -> list[Part]:
     """A curtain beside a window."""
     width, depth, height = piece.size_m
-    return [Part("", folds(width, depth, 0.0, height, max(2, round(width / 0.09))), palette.curtain)]
+    return [Part("", curtain(width, depth, height, max(3, round(width / 0.085)), piece.detail[0]), palette.curtain)]
 
 
 def build_curtain_rod(piece: Piece, palette: Palette) -> list[Part]:
-    """The rod that curtains hang from, with its brackets."""
+    """The rod that curtains hang from, with brackets, rings and knobs at its ends."""
     width, depth, height = piece.size_m
     half, y, z = 0.5 * width, 0.5 * depth, 0.5 * height
-    rod = [bar((-half, y, z), (half, y, z), 0.012)]
-    rod += [block((x - 0.01, 0.0, z - 0.01), (x + 0.01, y, z + 0.01)) for x in (-half + 0.03, half - 0.03)]
-    return [Part("", join(rod), palette.black)]
-
-
-def build_vase(piece: Piece, palette: Palette) -> list[Part]:
-    """A vase."""
-    radius, height = 0.5 * piece.size_m[0], piece.size_m[2]
-    waist = 0.4 + 0.4 * piece.detail[0]
-    outline: Profile = [(0.0, 0.0), (0.6 * radius, 0.0), (radius, 0.4 * height), (waist * radius, 0.8 * height)]
-    outline += [(0.7 * radius, height), (0.6 * radius, height), (0.0, 0.9 * height)]
-    return [Part("", lathe(outline, (0.0, 0.5 * piece.size_m[1]), 24), palette.accents[int(5 * piece.detail[1])])]
-
-
-def build_bowl(piece: Piece, palette: Palette) -> list[Part]:
-    """A bowl."""
-    radius, height = 0.5 * piece.size_m[0], piece.size_m[2]
-    outline: Profile = [(0.0, 0.0), (0.45 * radius, 0.0), (0.85 * radius, 0.5 * height), (radius, height)]
-    outline += [(0.94 * radius, height), (0.5 * radius, 0.25 * height), (0.0, 0.2 * height)]
-    return [Part("", lathe(outline, (0.0, 0.5 * piece.size_m[1]), 24), palette.accents[int(5 * piece.detail[1])])]
-
-
-def build_cup(piece: Piece, palette: Palette) -> list[Part]:
-    """A cup with a handle."""
-    width, depth, height = piece.size_m
-    radius, y = 0.38 * width, 0.5 * depth
-    body: Profile = [(0.0, 0.0), (0.8 * radius, 0.0), (radius, height), (0.88 * radius, height)]
-    body += [(0.7 * radius, 0.15 * height), (0.0, 0.12 * height)]
-    grip_x = 0.5 * width - 0.006
-    grip = [
-        block((0.8 * radius, y - 0.005, 0.70 * height), (grip_x, y + 0.005, 0.82 * height), 0.002),
-        block((0.75 * radius, y - 0.005, 0.25 * height), (grip_x, y + 0.005, 0.37 * height), 0.002),
-        block((grip_x - 0.01, y - 0.005, 0.25 * height), (grip_x, y + 0.005, 0.82 * height), 0.002),
-    ]
-    return [Part("", join([lathe(body, (0.0, y), 20), *grip]), palette.accents[int(5 * piece.detail[0])])]
-
-
-def build_books(piece: Piece, palette: Palette) -> list[Part]:
-    """Books lying on each other."""
-    width, depth, height = piece.size_m
-    parts, count = [], 3
-    for index in range(count):
-        shrink = 1.0 - 0.25 * piece.detail[index]
-        half, deep = 0.5 * width * shrink, depth * shrink
-        low, high = height * index / count, height * (index + 1) / count
-        book = block((-half, 0.5 * (depth - deep), low), (half, 0.5 * (depth + deep), high), 0.004)
+    parts = [bar((-half + 0.03, y, z), (half - 0.03, y, z), 0.011, 12)]
+    for side in (-1.0, 1.0):
+        x = side * (half - 0.09)
+        parts += [bar((x, 0.0, z), (x, y, z), 0.008, 8), bar((x, 0.0, z), (x, 0.012, z), 0.02, 14)]
+        path = [
+            (side * (half - 0.045), y, z),
+            (side * (half - 0.03), y, z),
+            (side * (half - 0.015), y, z),
+            (side * half, y, z),
+        ]
         parts.append(
-            Part("" if index == 0 else f"{index}", book, palette.accents[(index + int(5 * piece.detail[3])) % 5])
+            tube(
+                path if side > 0 else path[::-1],
+                [0.012, 0.02, 0.02, 0.006] if side > 0 else [0.006, 0.02, 0.02, 0.012],
+                12,
+            )
         )
-    return parts
+    return [Part("", join(parts), palette.handle)]
+
+
+def build_radiator(piece: Piece, palette: Palette) -> list[Part]:
+    """A ribbed radiator on the wall, with a pipe to the floor."""
+    width, depth, height = piece.size_m
+    half, low = 0.5 * width, 0.12
+    ribs = max(4, round(width / 0.075))
+    pitch = width / ribs
+    one = block((-0.42 * pitch, 0.03, low + 0.03), (0.42 * pitch, depth, height - 0.03), 0.02, 2)
+    parts = [moved(one, (-half + (k + 0.5) * pitch, 0.0, 0.0)) for k in range(ribs)]
+    for z in (low + 0.08, height - 0.08):
+        parts.append(bar((-half, 0.5 * depth, z), (half, 0.5 * depth, z), 0.022, 10))
+    parts += [
+        block((x - 0.02, 0.0, z), (x + 0.02, 0.5 * depth, z + 0.04), 0.004)
+        for x in (-0.6 * half, 0.6 * half)
+        for z in (low + 0.1, height - 0.14)
+    ]
+    x = half - 0.012
+    pipe = tube([(x, 0.5 * depth, 0.0), (x, 0.5 * depth, low + 0.08)], 0.011, 10)
+    knob = post((x, 0.5 * depth), 0.022, low - 0.03, low + 0.03, 14, 0.004)
+    return [Part("", join(parts), palette.trim), Part("pipe", join([pipe, knob]), palette.metal)]
+
+
+def build_tv(piece: Piece, palette: Palette) -> list[Part]:
+    """A television on two feet, its screen towards +y."""
+    width, depth, height = piece.size_m
+    half, middle = 0.5 * width, 0.5 * depth
+    body = block((-half, middle - 0.022, 0.06), (half, middle + 0.010, height), 0.006)
+    bulge = block((-0.6 * half, middle - 0.06, 0.12), (0.6 * half, middle - 0.02, 0.6 * height), 0.015)
+    screen = block((-half + 0.012, middle + 0.006, 0.078), (half - 0.012, middle + 0.0125, height - 0.012), 0.001)
+    feet = []
+    for side in (-1.0, 1.0):
+        x = side * 0.65 * half
+        for y in (0.012, depth - 0.012):
+            feet.append(tube([(x, y, 0.008), (x, middle, 0.075)], 0.008, 8))
+    dark = palette.black
+    return [Part("", join([body, bulge]), dark), Part("screen", screen, dark), Part("feet", join(feet), dark)]
+
+
+def build_umbrella_stand(piece: Piece, palette: Palette) -> list[Part]:
+    """A tall jar with an umbrella."""
+    radius, height = 0.5 * min(piece.size_m[:2]), piece.size_m[2]
+    centre = (0.0, 0.5 * piece.size_m[1])
+    jar_z = 0.62 * height
+    jar = [(0.0, 0.0), (0.85 * radius, 0.0), (radius, 0.1 * jar_z), (radius, jar_z), (0.92 * radius, jar_z)]
+    jar += [(0.90 * radius, 0.05 * jar_z), (0.0, 0.05 * jar_z)]
+    cloth = lathe(
+        [(0.0, 0.05), (0.015, 0.06), (0.045, 0.5 * height), (0.02, 0.8 * height), (0.0, 0.82 * height)], centre, 14
+    )
+    hook = [(0.0, 0.8), (0.0, 0.93), (0.02, 0.985), (0.05, 0.995), (0.065, 0.96)]
+    grip = tube([(x, centre[1], z * height) for x, z in hook], 0.009, 8)
+    return [
+        Part("", lathe(jar, centre, 24), palette.ceramic if piece.detail[0] < 0.5 else palette.metal),
+        Part("umbrella", cloth, palette.accents[int(5 * piece.detail[1])]),
+        Part("grip", grip, palette.wood),
+    ]

@@ -1,20 +1,33 @@
-"""The materials of one room, drawn together so that they go together."""
+"""The materials and the manner of one room, drawn together so that they go together."""
 
 import colorsys
 from dataclasses import dataclass
 
 import numpy as np
 
+from perpetua.rooms.procedural.prints import paint_print, paint_rug
 from perpetua.rooms.types import Material
 
 Color = tuple[float, float, float]
+PICTURES = 6
+
+
+@dataclass(frozen=True)
+class Style:
+    """The manner in which a room's furniture is made."""
+
+    legs: str
+    handles: str
+    fronts: str
 
 
 @dataclass(frozen=True)
 class Palette:
-    """What everything in a room is made of."""
+    """What everything in a room is made of, and in what manner."""
 
+    style: Style
     wall: Material
+    accent_wall: Material
     ceiling: Material
     trim: Material
     floor: Material
@@ -22,66 +35,109 @@ class Palette:
     dark_wood: Material
     lacquer: Material
     worktop: Material
+    splashback: Material
     upholstery: Material
+    second_upholstery: Material
     linen: Material
+    blanket: Material
     rug: Material
     curtain: Material
     metal: Material
+    warm_metal: Material
     black: Material
     ceramic: Material
     mirror: Material
+    wicker: Material
     leaf: Material
+    second_leaf: Material
+    bark: Material
     soil: Material
+    paper: Material
     lamp_shade: Material
     accents: tuple[Material, ...]
+    books: tuple[Material, ...]
     pictures: tuple[Material, ...]
+
+    @property
+    def handle(self) -> Material:
+        """What handles and taps are made of."""
+        return {"bar": self.black, "knob": self.warm_metal}.get(self.style.handles, self.metal)
 
 
 # Linear RGB of light and dark grain.
 WOODS: tuple[tuple[Color, Color], ...] = (
-    ((0.50, 0.30, 0.14), (0.36, 0.20, 0.085)),
-    ((0.62, 0.44, 0.26), (0.50, 0.33, 0.18)),
-    ((0.29, 0.14, 0.065), (0.19, 0.085, 0.04)),
-    ((0.40, 0.27, 0.17), (0.29, 0.185, 0.11)),
+    ((0.52, 0.31, 0.15), (0.33, 0.17, 0.07)),
+    ((0.64, 0.46, 0.28), (0.47, 0.30, 0.16)),
+    ((0.30, 0.15, 0.07), (0.17, 0.075, 0.034)),
+    ((0.41, 0.28, 0.18), (0.26, 0.165, 0.095)),
+    ((0.58, 0.50, 0.40), (0.44, 0.36, 0.27)),
 )
 DARK_WOODS: tuple[tuple[Color, Color], ...] = (
-    ((0.12, 0.060, 0.032), (0.07, 0.035, 0.02)),
-    ((0.17, 0.085, 0.04), (0.10, 0.05, 0.025)),
-    ((0.07, 0.060, 0.055), (0.04, 0.035, 0.03)),
+    ((0.13, 0.064, 0.034), (0.06, 0.030, 0.017)),
+    ((0.18, 0.09, 0.042), (0.085, 0.042, 0.02)),
+    ((0.07, 0.060, 0.055), (0.032, 0.028, 0.025)),
 )
+CERAMIC: Color = (0.82, 0.82, 0.80)
 
 
-def sample_palette(rng: np.random.Generator, kind: str) -> Palette:
-    """Draws the materials of a room of this kind."""
+def sample_palette(rng: np.random.Generator, kind: str, lamps_on: bool) -> Palette:
+    """Draws the materials and the manner of a room of this kind."""
     hue = float(rng.uniform())
     wood, dark_wood = (_wood(name, woods, rng) for name, woods in (("wood", WOODS), ("dark wood", DARK_WOODS)))
-    plain_wall = _color(hue + rng.uniform(-0.05, 0.05), rng.uniform(0.03, 0.22), rng.uniform(0.62, 0.85))
-    cloth = _color(hue + rng.choice([0.0, 0.08, 0.5]), rng.uniform(0.25, 0.7), rng.uniform(0.12, 0.5))
-    second_cloth = _color(hue + rng.choice([0.1, 0.4, 0.6]), rng.uniform(0.3, 0.75), rng.uniform(0.2, 0.6))
-    lacquer = _color(hue + rng.uniform(-0.1, 0.1), rng.choice([0.03, 0.1, 0.45]), rng.uniform(0.4, 0.8))
-    stone = _color(rng.uniform(0.05, 0.15), 0.08, rng.choice([0.12, 0.6]))
+    cloth = _color(hue + rng.choice([0.0, 0.08, 0.5]), rng.uniform(0.12, 0.6), rng.uniform(0.12, 0.55))
+    other_cloth = _color(hue + rng.choice([0.1, 0.42, 0.58]), rng.uniform(0.25, 0.7), rng.uniform(0.2, 0.55))
+    lacquer = _color(hue + rng.uniform(-0.1, 0.1), rng.choice([0.03, 0.15, 0.4]), rng.uniform(0.35, 0.8))
+    stone = _color(rng.uniform(0.05, 0.15), 0.06, rng.choice([0.06, 0.45, 0.7]))
+    wall, accent_wall = _walls(kind, hue, rng)
     return Palette(
-        wall=_wall(kind, plain_wall, rng),
-        ceiling=Material("ceiling", (0.82, 0.82, 0.80), (0.79, 0.79, 0.77), 0.9, pattern="plaster", scale_m=0.3),
-        trim=Material("trim", (0.78, 0.77, 0.74), roughness=0.4),
+        style=_style(rng),
+        wall=wall,
+        accent_wall=accent_wall,
+        ceiling=Material("ceiling", (0.84, 0.84, 0.82), (0.80, 0.80, 0.78), 0.9, pattern="plaster", scale_m=0.4),
+        trim=Material("trim", (0.80, 0.79, 0.76), roughness=0.35),
         floor=_floor(kind, rng),
         wood=wood,
         dark_wood=dark_wood,
-        lacquer=Material("lacquer", lacquer, roughness=0.35),
-        worktop=Material("worktop", stone, _shade(stone, 0.6), 0.25, pattern="marble", scale_m=0.5),
-        upholstery=Material("upholstery", cloth, _shade(cloth, 0.75), 0.95, pattern="fabric", scale_m=0.012),
-        linen=Material("linen", (0.72, 0.71, 0.68), (0.64, 0.63, 0.60), 0.95, pattern="fabric", scale_m=0.01),
-        rug=_rug(second_cloth, rng),
-        curtain=Material("curtain", _shade(second_cloth, 1.2), second_cloth, 0.95, pattern="fabric", scale_m=0.015),
-        metal=Material("metal", (0.56, 0.55, 0.53), roughness=0.3, metallic=1.0),
-        black=Material("black", (0.018, 0.018, 0.02), roughness=0.25),
-        ceramic=Material("ceramic", (0.82, 0.82, 0.80), roughness=0.12),
-        mirror=Material("mirror", (0.85, 0.86, 0.87), roughness=0.04, metallic=1.0),
-        leaf=Material("leaf", (0.045, 0.16, 0.03), (0.08, 0.24, 0.05), 0.5, pattern="stripes", scale_m=0.04),
-        soil=Material("soil", (0.05, 0.03, 0.02), roughness=1.0),
-        lamp_shade=Material("lamp shade", (0.85, 0.78, 0.62), roughness=0.9, emission_w_m2=6.0),
+        lacquer=Material("lacquer", lacquer, roughness=float(rng.uniform(0.2, 0.45))),
+        worktop=_worktop(stone, rng),
+        splashback=_splashback(hue, rng),
+        upholstery=_cloth("upholstery", cloth, rng),
+        second_upholstery=_cloth("second upholstery", other_cloth, rng),
+        linen=Material("linen", (0.74, 0.73, 0.70), (0.62, 0.61, 0.58), 0.95, pattern="fabric", scale_m=0.02),
+        blanket=_cloth("blanket", cloth if rng.uniform() < 0.5 else _shade(other_cloth, 1.2), rng),
+        rug=_rug(hue + 0.1 * rng.uniform(), rng),
+        curtain=_cloth("curtain", _shade(other_cloth, 1.3) if rng.uniform() < 0.6 else (0.70, 0.68, 0.63), rng),
+        metal=Material("metal", (0.58, 0.57, 0.55), (0.46, 0.45, 0.44), 0.28, 1.0, "brushed", 0.05),
+        warm_metal=Material("warm metal", (0.72, 0.50, 0.24), (0.62, 0.42, 0.2), 0.25, 1.0, "brushed", 0.05),
+        black=Material("black", (0.018, 0.018, 0.02), roughness=0.22),
+        ceramic=Material("ceramic", CERAMIC, roughness=0.1),
+        mirror=Material("mirror", (0.80, 0.81, 0.82), roughness=0.05, metallic=1.0),
+        wicker=Material("wicker", (0.42, 0.27, 0.13), (0.17, 0.095, 0.04), 0.7, pattern="wicker", scale_m=0.03),
+        leaf=Material("leaf", (0.035, 0.13, 0.025), (0.07, 0.22, 0.04), 0.4, pattern="fabric", scale_m=0.15),
+        second_leaf=Material("pale leaf", (0.10, 0.22, 0.07), (0.05, 0.13, 0.05), 0.45, pattern="fabric", scale_m=0.2),
+        bark=Material("bark", (0.20, 0.13, 0.08), (0.10, 0.06, 0.035), 0.9, pattern="fabric", scale_m=0.05),
+        soil=Material("soil", (0.05, 0.03, 0.02), (0.02, 0.013, 0.01), 1.0, pattern="terrazzo", scale_m=0.02),
+        paper=Material("paper", (0.78, 0.75, 0.68), roughness=0.9),
+        lamp_shade=Material("lamp shade", (0.95, 0.83, 0.64), roughness=0.9, emission_w_m2=14.0 if lamps_on else 0.0),
         accents=tuple(_accent(f"accent {index}", hue + 0.2 * index, rng) for index in range(5)),
-        pictures=tuple(_picture(f"picture {index}", rng) for index in range(4)),
+        books=tuple(_book(f"book {index}", rng) for index in range(7)),
+        pictures=tuple(_picture(f"picture {index}", hue, rng) for index in range(PICTURES)),
+    )
+
+
+def cloth_of(material: Material) -> Material:
+    """Cloth in the colour of a plain material; any other stays what it is."""
+    if material.pattern != "plain" or material.image is not None:
+        return material
+    second = _shade(material.base_color, 0.65)
+    return Material(f"{material.name} cloth", material.base_color, second, 0.95, pattern="fabric", scale_m=0.02)
+
+
+def _style(rng: np.random.Generator) -> Style:
+    return Style(
+        legs=str(rng.choice(["turned", "tapered", "square", "metal"])),
+        handles=str(rng.choice(["bar", "knob", "cup"])),
+        fronts=str(rng.choice(["flat", "framed"])),
     )
 
 
@@ -91,44 +147,83 @@ def _color(hue: float, saturation: float, value: float) -> Color:
 
 
 def _shade(color: Color, factor: float) -> Color:
-    red, green, blue = (min(1.0, factor * channel) for channel in color)
+    red, green, blue = (min(0.9, factor * channel) for channel in color)
     return red, green, blue
 
 
 def _wood(name: str, woods: tuple[tuple[Color, Color], ...], rng: np.random.Generator) -> Material:
     light, dark = woods[int(rng.integers(len(woods)))]
-    return Material(name, light, dark, float(rng.uniform(0.35, 0.6)), pattern="wood", scale_m=0.12)
+    return Material(name, light, dark, float(rng.uniform(0.3, 0.55)), pattern="wood", scale_m=0.09)
 
 
-def _wall(kind: str, plain: Color, rng: np.random.Generator) -> Material:
+def _cloth(name: str, color: Color, rng: np.random.Generator) -> Material:
+    if rng.uniform() < 0.35:
+        return Material(name, color, _shade(color, 0.6), 0.8, pattern="velvet", scale_m=0.35)
+    return Material(name, color, _shade(color, 0.68), 0.95, pattern="fabric", scale_m=float(rng.uniform(0.015, 0.03)))
+
+
+def _walls(kind: str, hue: float, rng: np.random.Generator) -> tuple[Material, Material]:
+    """Most walls of a room, and the one that differs."""
+    plain = _color(hue + rng.uniform(-0.05, 0.05), rng.uniform(0.02, 0.16), rng.uniform(0.62, 0.85))
+    strong = _color(hue + rng.uniform(-0.1, 0.1), rng.uniform(0.2, 0.5), rng.uniform(0.16, 0.6))
     if kind == "bathroom":
-        tile_m = float(rng.choice([0.15, 0.2, 0.3]))
-        return Material("wall tiles", _shade(plain, 1.1), _shade(plain, 0.75), 0.2, pattern="tile", scale_m=tile_m)
-    return Material("wall plaster", plain, _shade(plain, 0.94), 0.9, pattern="plaster", scale_m=0.4)
+        pattern = str(rng.choice(["tile", "bricks"]))
+        tile_m = float(rng.choice([0.1, 0.15, 0.2]) if pattern == "tile" else rng.choice([0.075, 0.1, 0.15]))
+        tiles = Material("wall tiles", _shade(plain, 1.1), _shade(plain, 0.62), 0.12, pattern=pattern, scale_m=tile_m)
+        color = strong if rng.uniform() < 0.6 else plain
+        return tiles, Material("accent tiles", color, _shade(plain, 0.6), 0.15, pattern=pattern, scale_m=tile_m)
+    plaster = Material("wall plaster", plain, _shade(plain, 0.92), 0.9, pattern="plaster", scale_m=0.5)
+    manner = rng.uniform()
+    if manner < 0.35:
+        return plaster, plaster
+    if manner < 0.7:
+        return plaster, Material("accent paint", strong, _shade(strong, 0.9), 0.85, pattern="plaster", scale_m=0.5)
+    paper_m = float(rng.uniform(0.14, 0.3))
+    paper = Material("wallpaper", plain, _shade(plain, 0.78), 0.85, pattern="wallpaper", scale_m=paper_m)
+    return plaster, paper
 
 
 def _floor(kind: str, rng: np.random.Generator) -> Material:
-    if kind == "bathroom" or (kind == "kitchen" and rng.uniform() < 0.7):
-        grey = _color(rng.uniform(0.02, 0.6), rng.uniform(0.0, 0.15), rng.uniform(0.25, 0.6))
-        pattern = str(rng.choice(["tile", "checks", "marble"]))
-        return Material("floor tiles", grey, _shade(grey, 0.55), 0.3, pattern=pattern, scale_m=0.4)
-    light, dark = WOODS[int(rng.integers(len(WOODS)))]
-    return Material("floor boards", light, dark, 0.45, pattern="wood", scale_m=0.18)
+    if kind == "bathroom" or (kind == "kitchen" and rng.uniform() < 0.6):
+        grey = _color(rng.uniform(0.02, 0.6), rng.uniform(0.0, 0.14), rng.uniform(0.22, 0.6))
+        pattern = str(rng.choice(["tile", "checks", "terrazzo", "marble"]))
+        scale_m = {"terrazzo": 0.05, "checks": 0.6, "marble": 1.1}.get(pattern, float(rng.choice([0.3, 0.45, 0.6])))
+        return Material("floor tiles", grey, _shade(grey, 0.5), 0.22, pattern=pattern, scale_m=scale_m)
+    light, dark = (WOODS + DARK_WOODS[:2])[int(rng.integers(len(WOODS) + 2))]
+    return Material("floor boards", light, dark, float(rng.uniform(0.28, 0.45)), pattern="planks", scale_m=0.14)
 
 
-def _rug(color: Color, rng: np.random.Generator) -> Material:
-    pattern = str(rng.choice(["fabric", "stripes", "checks"]))
-    scale_m = 0.02 if pattern == "fabric" else float(rng.uniform(0.15, 0.35))
-    return Material("rug", color, _shade(color, float(rng.choice([0.55, 1.7]))), 1.0, pattern=pattern, scale_m=scale_m)
+def _worktop(stone: Color, rng: np.random.Generator) -> Material:
+    if rng.uniform() < 0.35:
+        return Material("worktop", WOODS[0][0], WOODS[0][1], 0.4, pattern="wood", scale_m=0.06)
+    if rng.uniform() < 0.5:
+        return Material("worktop", stone, _shade(stone, 0.5), 0.2, pattern="terrazzo", scale_m=0.03)
+    return Material("worktop", stone, _shade(stone, 0.45), 0.15, pattern="marble", scale_m=0.7)
+
+
+def _splashback(hue: float, rng: np.random.Generator) -> Material:
+    color = _color(hue + rng.uniform(-0.1, 0.1), rng.choice([0.03, 0.35]), rng.uniform(0.4, 0.8))
+    pattern = str(rng.choice(["tile", "bricks"]))
+    return Material("splashback", color, (0.55, 0.54, 0.52), 0.1, pattern=pattern, scale_m=0.1)
+
+
+def _rug(hue: float, rng: np.random.Generator) -> Material:
+    if rng.uniform() < 0.7:
+        return Material("rug", (0.5, 0.5, 0.5), roughness=1.0, scale_m=0.0, image=paint_rug(rng, hue))
+    color = _color(hue, rng.uniform(0.1, 0.5), rng.uniform(0.25, 0.65))
+    return Material("rug", color, _shade(color, 0.5), 1.0, pattern="fabric", scale_m=0.05)
 
 
 def _accent(name: str, hue: float, rng: np.random.Generator) -> Material:
-    color = _color(hue + rng.uniform(-0.07, 0.07), rng.uniform(0.35, 0.85), rng.uniform(0.2, 0.7))
-    return Material(name, color, roughness=float(rng.uniform(0.2, 0.8)))
+    color = _color(hue + rng.uniform(-0.07, 0.07), rng.uniform(0.3, 0.8), rng.uniform(0.2, 0.7))
+    return Material(name, color, roughness=float(rng.uniform(0.15, 0.7)))
 
 
-def _picture(name: str, rng: np.random.Generator) -> Material:
-    ground = _color(rng.uniform(), rng.uniform(0.2, 0.7), rng.uniform(0.3, 0.8))
-    figure = _color(rng.uniform(), rng.uniform(0.3, 0.9), rng.uniform(0.1, 0.7))
-    pattern = str(rng.choice(["marble", "checks", "stripes", "tile"]))
-    return Material(name, ground, figure, 0.6, pattern=pattern, scale_m=float(rng.uniform(0.12, 0.4)))
+def _book(name: str, rng: np.random.Generator) -> Material:
+    color = _color(rng.uniform(), rng.uniform(0.1, 0.75), rng.uniform(0.08, 0.6))
+    return Material(name, color, roughness=0.6)
+
+
+def _picture(name: str, hue: float, rng: np.random.Generator) -> Material:
+    image = paint_print(rng, hue + rng.choice([0.0, 0.1, 0.35, 0.5]))
+    return Material(name, (0.5, 0.5, 0.5), roughness=0.35, scale_m=0.0, image=image)

@@ -5,27 +5,30 @@ import numpy as np
 from perpetua.rooms.config import RoomKind
 from perpetua.rooms.procedural.kinds import furnish
 from perpetua.rooms.procedural.layout import Layout
+from perpetua.rooms.procedural.light import lamp_lights, sample_sky, window_lights
 from perpetua.rooms.procedural.palette import sample_palette
-from perpetua.rooms.procedural.plan import DETAILS, Opening, Piece, RoomPlan, at_wall, wall_length_m
+from perpetua.rooms.procedural.plan import DETAILS, FloorPlan, Opening, Piece, RoomPlan
 from perpetua.rooms.source import RoomWish
 
 LAYOUTS = 8
 DOOR_WIDTH_M = 0.9
 DOOR_HEIGHT_M = 2.05
 CORNER_M = 0.45
-LARGE_ROOM_M2 = 30.0
-CEILING_LAMP_M = 0.55
+LARGE_ROOM_M2 = 26.0
+CEILING_LAMP_M = 0.5
+# A corner is cut from this share of the rooms that stay this large.
+L_SHARE = 0.45
+L_MIN_AREA_M2 = 20.0
+L_MIN_ARM_M = 2.7
 
 
 def sample_room(rng: np.random.Generator, wish: RoomWish) -> RoomPlan | None:
     """The plan of a room; None if the furniture that its kind needs does not fit."""
-    kind, (width_m, depth_m, height_m) = wish.kind, wish.size_m
-    walls = [int(wall) for wall in rng.permutation(4)]
-    door = _sample_door(rng, walls[0], width_m, depth_m)
-    count = 1 if kind == "bathroom" else int(rng.integers(1, 4))
-    windows = tuple(_sample_window(rng, kind, wall, width_m, depth_m, height_m) for wall in walls[1 : 1 + count])
+    kind, height_m = wish.kind, wish.size_m[2]
+    floor = sample_floor(rng, wish)
     for _ in range(LAYOUTS):
-        layout = Layout(rng, width_m, depth_m, door, windows)
+        door, windows = _sample_openings(rng, floor, kind, height_m)
+        layout = Layout(rng, floor, door, windows)
         if kind in ("bedroom", "livingroom", "diningroom"):
             for window in windows:
                 _hang_curtains(layout, window)
@@ -33,77 +36,125 @@ def sample_room(rng: np.random.Generator, wish: RoomWish) -> RoomPlan | None:
             break
     else:
         return None
-    lamps = _ceiling_lamps(layout, height_m)
-    evening = wish.daytime != "day"
+    pieces = (*layout.pieces, *_ceiling_lamps(layout, height_m))
+    accent_wall, palette = int(rng.integers(len(floor.walls))), sample_palette(rng, kind, wish.lamps_on)
+    # Light comes last, so that it changes nothing about what stands where.
+    lights = window_lights(rng, floor, windows, wish.daytime)
+    if wish.lamps_on:
+        lights += lamp_lights(rng, floor, pieces)
     return RoomPlan(
         kind=kind,
-        width_m=width_m,
-        depth_m=depth_m,
+        floor=floor,
         height_m=height_m,
-        wall_thickness_m=0.2,
         door=door,
         windows=windows,
-        pieces=(*layout.pieces, *lamps),
-        palette=sample_palette(rng, kind),
-        lamp_power_w=float(rng.uniform(3.0, 4.5)) * width_m * depth_m / len(lamps),
-        daylight_power_w=float(rng.uniform(8.0, 16.0) if evening else rng.uniform(50.0, 110.0)),
-        lamp_color=(1.0, float(rng.uniform(0.82, 0.95)), float(rng.uniform(0.65, 0.85))),
-        daylight_color=(1.0, 0.72, 0.5) if evening else (float(rng.uniform(0.85, 1.0)), 0.95, 1.0),
+        accent_wall=accent_wall,
+        pieces=pieces,
+        palette=palette,
+        lights=tuple(lights),
+        sky=sample_sky(rng, wish.daytime),
     )
 
 
-def _sample_door(rng: np.random.Generator, wall: int, width_m: float, depth_m: float) -> Opening:
-    reach_m = 0.5 * wall_length_m(wall, width_m, depth_m) - 0.5 * DOOR_WIDTH_M - CORNER_M
+def sample_floor(rng: np.random.Generator, wish: RoomWish) -> FloorPlan:
+    """A rectangle, or an L where what is left is large enough and both arms are wide enough."""
+    width_m, depth_m, _ = wish.size_m
+    corner, wanted = int(rng.integers(4)), rng.uniform() < L_SHARE
+    shares = rng.uniform(0.25, 0.45, size=2)
+    # Even corners are arrived at along y and left along x.
+    sides = (depth_m, width_m) if corner % 2 == 0 else (width_m, depth_m)
+    notch = (round(float(shares[0]) * sides[0], 2), round(float(shares[1]) * sides[1], 2))
+    area_m2 = width_m * depth_m - notch[0] * notch[1]
+    arms_m = (sides[0] - notch[0], sides[1] - notch[1])
+    if wanted and area_m2 >= L_MIN_AREA_M2 and min(arms_m) >= L_MIN_ARM_M:
+        return FloorPlan(width_m, depth_m, corner, notch)
+    return FloorPlan(width_m, depth_m)
+
+
+def _sample_openings(
+    rng: np.random.Generator, floor: FloorPlan, kind: RoomKind, height_m: float
+) -> tuple[Opening, tuple[Opening, ...]]:
+    """The door, and windows in other walls: none of them on walls that are too short."""
+    long = [number for number, wall in enumerate(floor.walls) if wall.length_m > DOOR_WIDTH_M + 2 * CORNER_M]
+    # Windows look outwards: the walls of a notch border on other rooms.
+    outer = [number for number in long if _faces_outwards(floor, number)]
+    walls = [int(wall) for wall in rng.permutation(outer)]
+    inner = [number for number in long if number not in outer]
+    door_wall = inner[0] if inner and rng.uniform() < 0.5 else walls.pop()
+    door = _sample_door(rng, door_wall, floor)
+    count = 1 if kind == "bathroom" else int(rng.integers(1, 4))
+    windows = tuple(_sample_window(rng, kind, wall, floor, height_m) for wall in walls[:count])
+    return door, windows
+
+
+def _faces_outwards(floor: FloorPlan, number: int) -> bool:
+    after = floor.walls[(number + 1) % len(floor.walls)]
+    return floor.walls[number].starts_convex and after.starts_convex
+
+
+def _sample_door(rng: np.random.Generator, wall: int, floor: FloorPlan) -> Opening:
+    reach_m = 0.5 * floor.walls[wall].length_m - 0.5 * DOOR_WIDTH_M - CORNER_M
     return Opening(wall, float(rng.uniform(-reach_m, reach_m)), DOOR_WIDTH_M, 0.0, DOOR_HEIGHT_M)
 
 
-def _sample_window(
-    rng: np.random.Generator, kind: RoomKind, wall: int, width_m: float, depth_m: float, height_m: float
-) -> Opening:
-    length_m = wall_length_m(wall, width_m, depth_m)
+def _sample_window(rng: np.random.Generator, kind: RoomKind, wall: int, floor: FloorPlan, height_m: float) -> Opening:
+    length_m = floor.walls[wall].length_m
     small = kind == "bathroom"
-    wide_m = float(rng.uniform(0.7, 1.1) if small else rng.uniform(1.2, min(2.4, 0.45 * length_m)))
-    sill_m = float(rng.uniform(1.2, 1.35) if small else rng.uniform(0.92, 1.05))
+    wide_m = float(rng.uniform(0.8, 1.2) if small else rng.uniform(1.2, min(2.6, max(1.3, 0.45 * length_m))))
+    sill_m = float(rng.uniform(1.1, 1.3) if small else rng.uniform(0.88, 1.0))
     # Room for curtains between the window and the corner.
-    reach_m = max(0.0, 0.5 * length_m - 0.5 * wide_m - CORNER_M - 0.3)
-    return Opening(wall, float(rng.uniform(-reach_m, reach_m)), wide_m, sill_m, min(2.2, height_m - 0.3))
+    reach_m = max(0.0, 0.5 * length_m - 0.5 * wide_m - CORNER_M - 0.1)
+    return Opening(wall, float(rng.uniform(-reach_m, reach_m)), wide_m, sill_m, min(2.25, height_m - 0.25))
 
 
 def _hang_curtains(layout: Layout, window: Opening) -> None:
     """A rod above the window and a curtain on each side of it."""
-    wide_m, rod_z_m = 0.32, window.head_m + 0.10
+    wall, wide_m, rod_z_m = layout.floor.walls[window.wall], 0.34, window.head_m + 0.09
     for side in (-1.0, 1.0):
-        along_m = window.middle_m + side * (0.5 * window.width_m + 0.07 + 0.5 * wide_m)
-        x, y = at_wall(window.wall, along_m, 0.04, layout.width_m, layout.depth_m)
-        layout.add(layout.piece("curtain", (wide_m, 0.10, rod_z_m - 0.03), (x, y, 0.03), window.wall))
-    x, y = at_wall(window.wall, window.middle_m, 0.0, layout.width_m, layout.depth_m)
-    rod = (window.width_m + 2 * wide_m + 0.24, 0.18, 0.04)
-    layout.add(layout.piece("curtain_rod", rod, (x, y, rod_z_m), window.wall))
+        along_m = window.middle_m + side * (0.5 * window.width_m + 0.1 + 0.5 * wide_m)
+        position = (*wall.at(along_m, 0.04), 0.02)
+        layout.add(layout.piece("curtain", (wide_m, 0.10, rod_z_m - 0.02), position, wall.quarters))
+    rod = (window.width_m + 2 * wide_m + 0.3, 0.18, 0.04)
+    layout.add(layout.piece("curtain_rod", rod, (*wall.at(window.middle_m, 0.0), rod_z_m), wall.quarters))
 
 
 def _ceiling_lamps(layout: Layout, height_m: float) -> list[Piece]:
-    """One lamp, or two in a large room; a pendant over a dining table."""
+    """A pendant over a dining table, and dishes over the middle of each part of the room."""
+    lamps = []
     table = next((piece for piece in layout.pieces if piece.category == "dining_table"), None)
     if table is not None:
         x, y = table.to_world(0.0, 0.5 * table.size_m[1] - 0.25)
-        position = (x, y, 1.6)
-        return [_lamp(layout, "pendant", (0.5, 0.5, height_m - 1.6), position, table.quarters)] + [
-            _dish(layout, spot, height_m) for spot in _lamp_spots(layout)
-        ]
-    return [_dish(layout, spot, height_m) for spot in _lamp_spots(layout)]
+        low_m = min(1.62, height_m - 0.7)
+        lamps.append(_lamp(layout, "pendant", (0.5, 0.5, height_m - low_m), (x, y, low_m), table.quarters))
+    size = (CEILING_LAMP_M, CEILING_LAMP_M, 0.12)
+    for x, y in _lamp_spots(layout.floor):
+        lamp = _lamp(layout, "ceiling_lamp", size, (x, y - 0.5 * CEILING_LAMP_M, height_m - 0.12), 0)
+        if not any(lamp.box().overlaps(other.box(), 0.1) for other in [*layout.pieces, *lamps]):
+            lamps.append(lamp)
+    return lamps
 
 
-def _lamp_spots(layout: Layout) -> list[tuple[float, float]]:
-    if layout.width_m * layout.depth_m < LARGE_ROOM_M2:
+def _lamp_spots(floor: FloorPlan) -> list[tuple[float, float]]:
+    """The middle of a rectangle, or two places along it if it is large; of an L, the middles of its two arms."""
+    low, high = floor.corners_m.min(0), floor.corners_m.max(0)
+    if floor.notch is not None:
+        notch_low, notch_high = np.array(floor.notch.low_m[:2]), np.array(floor.notch.high_m[:2])
+        cut = notch_high - notch_low
+        # The corner opposite the notch belongs to both arms.
+        left = notch_low[0] <= low[0] + 1e-9
+        near = notch_low[1] <= low[1] + 1e-9
+        beside = ((high[0] if left else low[0]) + (notch_high[0] if left else notch_low[0])) / 2
+        across = ((high[1] if near else low[1]) + (notch_high[1] if near else notch_low[1])) / 2
+        middle = 0.5 * (notch_low + notch_high)
+        shift = 0.25 * (high - low - cut)
+        tall = (float(beside), float(0.5 * (middle[1] + (low[1] + high[1]) / 2)))
+        wide = (float(0.5 * (middle[0] + (low[0] + high[0]) / 2)), float(across))
+        return [tall, wide] if float(np.abs(shift).max()) > 0.0 else [tall]
+    width, depth = high - low
+    if floor.area_m2 < LARGE_ROOM_M2:
         return [(0.0, 0.0)]
-    along_x = layout.width_m >= layout.depth_m
-    quarter_m = 0.25 * max(layout.width_m, layout.depth_m)
-    return [(side * quarter_m, 0.0) if along_x else (0.0, side * quarter_m) for side in (-1.0, 1.0)]
-
-
-def _dish(layout: Layout, spot: tuple[float, float], height_m: float) -> Piece:
-    position = (spot[0], spot[1] - 0.5 * CEILING_LAMP_M, height_m - 0.12)
-    return _lamp(layout, "ceiling_lamp", (CEILING_LAMP_M, CEILING_LAMP_M, 0.12), position, 0)
+    quarter = 0.25 * float(max(width, depth))
+    return [(side * quarter, 0.0) if width >= depth else (0.0, side * quarter) for side in (-1.0, 1.0)]
 
 
 def _lamp(
