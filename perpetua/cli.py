@@ -114,16 +114,22 @@ def status(out: Path, as_json: bool) -> None:
 
 @main.command()
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--deep", is_flag=True, help="Also cast rays at the meshes, which the work area must still hold.")
+@click.option("--frames", type=click.IntRange(min=1), default=8, show_default=True, help="Frames that --deep looks at.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def verify(folders: tuple[Path, ...], as_json: bool) -> None:
+def verify(folders: tuple[Path, ...], deep: bool, frames: int, as_json: bool) -> None:
     """Check finished sequences: layout, projection, depth, visibility, queries.
 
     FOLDERS are sequence folders, or folders that hold some. Exit code 1 if a check fails.
     """
     from perpetua.audit.verify import find_sequences, verify_sequence
+    from perpetua.pipeline.kept import load_deep_scene
 
     bounds = Config().audit
-    reports = [verify_sequence(folder, bounds) for given in folders for folder in find_sequences(given)]
+    reports = []
+    for folder in (folder for given in folders for folder in find_sequences(given)):
+        scene = load_deep_scene(folder) if deep else None
+        reports.append(verify_sequence(folder, bounds, scene, frames))
     if as_json:
         click.echo(json.dumps([report.to_json() for report in reports], indent=1))
     else:
@@ -195,6 +201,24 @@ def preview(
     if plan_png is not None and sequence is not None:
         write_plan_view(sequence, plan_png)
         click.echo(f"wrote {plan_png}")
+
+
+@main.command()
+@click.argument("sequence", type=click.Path(path_type=Path))
+@click.option("--count", type=click.IntRange(min=1), default=1024, show_default=True, help="Tracks to draw.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Decides which.")
+@click.option("--from-pixels", metavar="VIEW:FRAME:STEP", help="Follow every STEP-th pixel of an image instead.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write.")
+def tracks(sequence: Path, count: int, seed: int, from_pixels: str | None, out: Path) -> None:
+    """Write a finished sequence again with other tracks, any number of them, without rendering.
+
+    The run's work area must still be there.
+    """
+    from perpetua.pipeline.retrack import PixelChoice, write_other_tracks
+
+    pixels = None if from_pixels is None else PixelChoice.parse(from_pixels)
+    made = write_other_tracks(sequence, out, count, seed, pixels)
+    click.echo(f"wrote {len(made.queries_xytv)} tracks to {out}")
 
 
 @main.command()

@@ -29,6 +29,18 @@ class AuditConfig(Section):
     max_depth_m: float = Field(100.0, gt=0.0, description="largest depth of an indoor scene, metres")
     rotation_error: float = Field(1e-5, gt=0.0, description="largest entry of R times its transpose minus identity")
     surface_error_m: float = Field(1e-4, gt=0.0, description="largest distance of a track from its triangle, metres")
+    deep_depth_m: float = Field(
+        0.001, gt=0.0, description="verify --deep: depth off silhouettes, constant part, metres"
+    )
+    deep_depth_share: float = Field(
+        1e-4, ge=0.0, description="verify --deep: depth off silhouettes, share of the depth"
+    )
+    deep_agreement: float = Field(
+        0.999, ge=0.0, le=1.0, description="verify --deep: share of pixels whose depth and object must agree with rays"
+    )
+    deep_visibility: float = Field(
+        0.999, ge=0.0, le=1.0, description="verify --deep: share of visibility entries that must agree with rays"
+    )
     moving_m: float = Field(
         0.05, gt=0.0, description="a track moves when two of its positions are so far apart, metres"
     )

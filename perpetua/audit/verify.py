@@ -5,6 +5,7 @@ from pathlib import Path
 
 from perpetua.audit.array_checks import check_cameras, check_finite, check_hashes, check_images
 from perpetua.audit.config import AuditConfig
+from perpetua.audit.deep import DeepScene, verify_deep
 from perpetua.audit.files import RECORD_FILE, SequenceFiles, load_files
 from perpetua.audit.report import AuditReport, Check
 from perpetua.audit.track_checks import (
@@ -40,8 +41,14 @@ def _hidden(path: Path, folder: Path) -> bool:
     return any(part.startswith(".") for part in path.relative_to(folder).parts)
 
 
-def verify_sequence(folder: Path, bounds: AuditConfig) -> AuditReport:
+def verify_sequence(folder: Path, bounds: AuditConfig, scene: DeepScene | None = None, frames: int = 8) -> AuditReport:
     """Runs every check that the files of a sequence allow.
+
+    Args:
+        folder: the sequence.
+        bounds: what each check allows.
+        scene: the meshes it was made from, for rays to be cast at; None for no rays.
+        frames: how many frames rays are cast in.
 
     Raises:
         SequenceFormatError: ``folder`` is no folder.
@@ -57,6 +64,8 @@ def verify_sequence(folder: Path, bounds: AuditConfig) -> AuditReport:
         checks.append(check_hashes(files))
     if _complete(files):
         checks += _track_checks(files, bounds, skipped)
+        if scene is not None and files.record is not None:
+            checks += verify_deep(files, scene, bounds, frames)
     else:
         skipped.append("tracks and visibility: files of the layout are missing or damaged")
     return AuditReport(folder, tuple(checks), tuple(skipped))

@@ -35,6 +35,7 @@ from perpetua.rooms.build import build_room
 from perpetua.rooms.scene_file_checks import scene_digests
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
+from perpetua.tracks.follow import TrackScene
 from perpetua.tracks.make import make_tracks
 from perpetua.tracks.types import SequenceTracks
 
@@ -255,14 +256,14 @@ def _render(context: StageContext) -> tuple[RenderedView, ...]:
 
 
 def _tracks(context: StageContext) -> SequenceTracks:
-    tracks = make_tracks(
+    scene = TrackScene(
         context.one("room", Room),
         context.many("actors", ActorMesh),
         context.many("cameras", CameraPath),
         context.many("render", RenderedView),
         context.config.tracks,
-        context.seed,
     )
+    tracks = make_tracks(scene, context.seed)
     write_json(context.folder / SIGHT_FIGURES, asdict(tracks.report))
     return tracks
 

@@ -7,6 +7,7 @@ from synthetic_scene import Scene, make_scene
 from perpetua.formats import EXPORTERS
 from perpetua.seeding import StageSeed
 from perpetua.tracks.config import TracksConfig
+from perpetua.tracks.follow import TrackScene
 from perpetua.tracks.make import make_tracks
 from perpetua.tracks.types import SequenceTracks
 
@@ -15,7 +16,8 @@ CONFIG = TracksConfig(count=200)
 
 def make_scene_tracks(scene: Scene, config: TracksConfig = CONFIG, seed: int = 5) -> SequenceTracks:
     """Tracks of the synthetic scene."""
-    return make_tracks(scene.room, scene.actors, scene.cameras, scene.views, config, StageSeed(seed, 0, "tracks"))
+    seen = TrackScene(scene.room, scene.actors, scene.cameras, scene.views, config)
+    return make_tracks(seen, StageSeed(seed, 0, "tracks"))
 
 
 def write_scene(folder: Path) -> tuple[Scene, SequenceTracks]:

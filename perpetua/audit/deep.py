@@ -1,0 +1,228 @@
+"""Checks of a sequence against the meshes it was made from, by rays that share no code with what made it.
+
+Rays are trimesh's (Embree, with trimesh's own scaling); depth along them is computed in double precision from the
+planes of the triangles met.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from jaxtyping import Bool, Float64, Int64, UInt16
+
+from perpetua.actors.types import ActorMesh
+from perpetua.audit.config import AuditConfig
+from perpetua.audit.files import SequenceFiles
+from perpetua.audit.geometry import camera_centre_m, depth_of_planes, project_to_pixels
+from perpetua.audit.report import Check
+from perpetua.rooms.types import Room
+
+NOTHING = 0
+# Depth bends by more than this share of itself from pixel to pixel only at silhouettes and creases.
+BEND_SHARE = 0.01
+# A ray has reached a point this far before it, metres: single precision's reach in a room.
+REACHED_M = 5e-4
+AROUND = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+
+
+@dataclass(frozen=True)
+class DeepScene:
+    """The meshes that a sequence shows, and, where they are kept, the object indices that were rendered."""
+
+    room: Room
+    actors: tuple[ActorMesh, ...]
+    object_index: tuple[UInt16[np.ndarray, "T H W"], ...] | None
+
+
+@dataclass(frozen=True)
+class _Met:
+    """What rays meet: object (0: nothing), the triangle's corners, its face within the object."""
+
+    object_index: Int64[np.ndarray, " N"]
+    face: Int64[np.ndarray, " N"]
+    triangle_m: Float64[np.ndarray, "N 3 3"]
+
+
+class _Part:
+    """Some objects as one mesh for rays."""
+
+    def __init__(self, meshes: list[tuple[int, np.ndarray, np.ndarray]]) -> None:
+        sizes = [len(faces) for _, _, faces in meshes]
+        self.owner = np.repeat([index for index, _, _ in meshes], sizes)
+        self.face = np.concatenate([np.arange(size) for size in sizes]) if sizes else np.zeros(0, int)
+        corners = [np.asarray(vertices, np.float64)[faces] for _, vertices, faces in meshes]
+        self.triangle_m = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
+        soup = np.arange(3 * len(self.triangle_m)).reshape(-1, 3)
+        self.shape = trimesh.Trimesh(self.triangle_m.reshape(-1, 3), soup, process=False) if len(soup) else None
+
+    def first(self, origin_m: np.ndarray, direction: np.ndarray) -> Int64[np.ndarray, " N"]:
+        """The triangle that each ray meets first, -1 for none."""
+        if self.shape is None:
+            return np.full(len(direction), -1)
+        origins = np.repeat(origin_m[None], len(direction), axis=0)
+        return np.asarray(self.shape.ray.intersects_first(origins, direction), np.int64)
+
+
+class _Rays:
+    """Rays at a scene, frame by frame."""
+
+    def __init__(self, scene: DeepScene) -> None:
+        self.scene = scene
+        things = [thing for thing in scene.room.objects if thing.opaque]
+        self.room = _Part([(thing.object_index, thing.mesh.vertices_m, thing.mesh.faces) for thing in things])
+        self.people, self.frame = _Part([]), -1
+
+    def meet(self, frame: int, origin_m: Float64[np.ndarray, "3"], direction: Float64[np.ndarray, "N 3"]) -> _Met:
+        """What rays from one point meet first."""
+        if frame != self.frame:
+            self.people = _Part([(a.object_index, a.vertices_m[frame], a.faces) for a in self.scene.actors])
+            self.frame = frame
+        met = _Met(np.zeros(len(direction), np.int64), np.full(len(direction), -1), np.zeros((len(direction), 3, 3)))
+        nearest = np.full(len(direction), np.inf)
+        for part in (self.room, self.people):
+            triangle = part.first(origin_m, direction)
+            rays = np.flatnonzero(triangle >= 0)
+            reach = _along(origin_m, direction[rays], part.triangle_m[triangle[rays]])
+            closer = reach < nearest[rays]
+            rays, triangle = rays[closer], triangle[rays][closer]
+            nearest[rays] = reach[closer]
+            met.object_index[rays], met.face[rays] = part.owner[triangle], part.face[triangle]
+            met.triangle_m[rays] = part.triangle_m[triangle]
+        return met
+
+
+def _along(
+    origin_m: Float64[np.ndarray, "3"], direction: Float64[np.ndarray, "N 3"], triangle_m: Float64[np.ndarray, "N 3 3"]
+) -> Float64[np.ndarray, " N"]:
+    """How many directions' lengths it is to the planes of triangles."""
+    normal = np.cross(triangle_m[:, 1] - triangle_m[:, 0], triangle_m[:, 2] - triangle_m[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        height = ((triangle_m[:, 0] - origin_m) * normal).sum(axis=1)
+        return np.nan_to_num(height / (direction * normal).sum(axis=1), nan=np.inf)
+
+
+@dataclass
+class _Share:
+    """Entries tested and wrong, with the first wrong one in words."""
+
+    tested: int = 0
+    wrong: int = 0
+    first: str = ""
+
+    def add(self, wrong: Bool[np.ndarray, "*any"], tested: Bool[np.ndarray, "*any"], where: str) -> None:
+        bad = wrong & tested
+        self.tested, self.wrong = self.tested + int(tested.sum()), self.wrong + int(bad.sum())
+        if bad.any() and not self.first:
+            self.first = f"{where}, at {np.argwhere(bad)[0].tolist()}"
+
+    def check(self, name: str, least: float) -> Check:
+        share = 1.0 - self.wrong / max(self.tested, 1)
+        passed = share >= least
+        detail = "" if passed else f"{self.wrong} of {self.tested} differ, first {self.first}"
+        return Check(name, passed, share, f">= {least:g} of entries", detail)
+
+
+def verify_deep(files: SequenceFiles, scene: DeepScene, bounds: AuditConfig, frames: int) -> list[Check]:
+    """Casts rays for depth, object and visibility.
+
+    Args:
+        files: the sequence, complete.
+        scene: the meshes it was made from.
+        bounds: shares that must agree, and how closely depth must.
+        frames: how many frames are looked at, at even distances.
+    """
+    rays = _Rays(scene)
+    depth, objects, sight = _Share(), _Share(), _Share()
+    total = len(files.arrays["tracks_xyz.npy"])
+    for frame in np.unique(np.linspace(0, total - 1, frames).round().astype(int)).tolist():
+        for number, view in enumerate(files.views):
+            where = f"view {view}, frame {frame}"
+            predicted_m, owner = _predict(files, rays, view, frame)
+            clear = _off_silhouettes(predicted_m, owner)
+            rendered_m = np.asarray(files.of_view(int(view), "depth.npy")[frame], np.float64)
+            allowed_m = bounds.deep_depth_m + bounds.deep_depth_share * predicted_m
+            depth.add(np.abs(rendered_m - predicted_m) > allowed_m, clear, where)
+            if scene.object_index is None:
+                on_actor = np.isin(owner, [actor.object_index for actor in scene.actors])
+                objects.add(on_actor != files.of_view(int(view), "foreground_mask.npy")[frame], clear, where)
+            else:
+                objects.add(owner != scene.object_index[number][frame], clear, where)
+            reached, shown = _evidence(files, rays, view, frame, owner)
+            visible = np.asarray(files.of_view(int(view), "visibility.npy")[frame])
+            # Entries off the image count: calling them visible would be wrong. What no pixel around shows is hidden
+            # by the format's rule.
+            wrong = np.where(shown, visible != reached, visible)
+            sight.add(wrong, np.ones(len(wrong), bool), where)
+    return [
+        depth.check("depth by rays", bounds.deep_agreement),
+        objects.check("objects by rays", bounds.deep_agreement),
+        sight.check("visibility by rays", bounds.deep_visibility),
+    ]
+
+
+def _predict(
+    files: SequenceFiles, rays: _Rays, view: str, frame: int
+) -> tuple[Float64[np.ndarray, "H W"], Int64[np.ndarray, "H W"]]:
+    """Depth (0: nothing) and object at each pixel centre."""
+    intrinsics, pose = files.of_view(int(view), "intrinsics.npy"), files.of_view(int(view), "extrinsics_w2c.npy")[frame]
+    _, height, width = files.of_view(int(view), "depth.npy").shape
+    row, column = np.mgrid[:height, :width].reshape(2, -1)
+    fx, fy, cx, cy = np.asarray(intrinsics, np.float64)
+    local = np.stack([(column - cx) / fx, (row - cy) / fy, np.ones(len(column))], axis=1)
+    met = rays.meet(frame, camera_centre_m(pose), local @ np.asarray(pose[:3, :3], np.float64))
+    depth_m = depth_of_planes(intrinsics, pose, met.triangle_m, column, row)
+    depth_m = np.where(met.object_index == NOTHING, 0.0, depth_m)
+    return depth_m.reshape(height, width), met.object_index.reshape(height, width)
+
+
+def _off_silhouettes(depth_m: Float64[np.ndarray, "H W"], owner: Int64[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
+    """Pixels all of whose neighbours show the same object on a surface that does not bend."""
+    clear = np.zeros(owner.shape, bool)
+    same = np.ones((owner.shape[0] - 2, owner.shape[1] - 2), bool)
+    for shifted in _neighbours(owner):
+        same &= shifted == owner[1:-1, 1:-1]
+    middle = depth_m[1:-1, 1:-1]
+    across = np.abs(depth_m[1:-1, 2:] + depth_m[1:-1, :-2] - 2 * middle)
+    down = np.abs(depth_m[2:, 1:-1] + depth_m[:-2, 1:-1] - 2 * middle)
+    clear[1:-1, 1:-1] = same & (np.maximum(across, down) <= BEND_SHARE * middle) & (middle > 0)
+    return clear
+
+
+def _neighbours(values: np.ndarray) -> Iterator[np.ndarray]:
+    height, width = values.shape
+    for down in range(3):
+        for right in range(3):
+            yield values[down : height - 2 + down, right : width - 2 + right]
+
+
+def _evidence(
+    files: SequenceFiles, rays: _Rays, view: str, frame: int, owner: Int64[np.ndarray, "H W"]
+) -> tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]:
+    """Where the ray from the camera reaches a track on the image, and where rays of the four pixel centres around
+    meet its object."""
+    assert files.record is not None
+    table = files.record["tracks"]
+    pose = files.of_view(int(view), "extrinsics_w2c.npy")[frame]
+    point_m = np.asarray(files.arrays["tracks_xyz.npy"][frame], np.float64)
+    seen = project_to_pixels(files.of_view(int(view), "intrinsics.npy"), pose, point_m)
+    _, height, width = files.of_view(int(view), "depth.npy").shape
+    with np.errstate(invalid="ignore"):
+        inside = (seen[:, 2] > 0) & (np.abs(seen[:, 0] - (width - 1) / 2) < width / 2)
+        inside &= np.abs(seen[:, 1] - (height - 1) / 2) < height / 2
+    chosen = np.flatnonzero(inside)
+    eye_m = camera_centre_m(pose)
+    offset_m = point_m[chosen] - eye_m
+    met = rays.meet(frame, eye_m, offset_m)
+    own = (met.object_index == np.asarray(table["object_index"])[chosen]) & (
+        met.face == np.asarray(table["face"])[chosen]
+    )
+    short_m = (1.0 - _along(eye_m, offset_m, met.triangle_m)) * np.linalg.norm(offset_m, axis=1)
+    reached, shown = np.zeros(len(point_m), bool), np.zeros(len(point_m), bool)
+    reached[chosen] = own | (met.object_index == NOTHING) | (short_m <= REACHED_M)
+    corner = np.floor(seen[chosen, :2]).astype(np.int64)[:, None] + AROUND
+    on_image = ((corner >= 0) & (corner < [width, height])).all(axis=2)
+    column, row = np.clip(corner[..., 0], 0, width - 1), np.clip(corner[..., 1], 0, height - 1)
+    own_object = owner[row, column] == np.asarray(table["object_index"])[chosen][:, None]
+    shown[chosen] = (own_object & on_image).any(axis=1)
+    return reached, shown

@@ -1,0 +1,79 @@
+"""The scene behind a finished sequence, as far as its work area is kept."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from perpetua.actors.types import ActorMesh, Route
+from perpetua.audit.deep import DeepScene
+from perpetua.cameras.types import CameraPath
+from perpetua.errors import InputError
+from perpetua.pipeline import codec
+from perpetua.pipeline.layout import WORK_FOLDER, RunRecord, read_run
+from perpetua.pipeline.stages import STAGES
+from perpetua.pipeline.store import StageFolder
+from perpetua.rendering.types import RenderedView
+from perpetua.rooms.types import Room
+
+
+@dataclass(frozen=True)
+class KeptScene:
+    """What a sequence was made from."""
+
+    run: RunRecord
+    room_number: int
+    room: Room
+    routes: tuple[Route, ...]
+    actors: tuple[ActorMesh, ...]
+    cameras: tuple[CameraPath, ...]
+    views: tuple[RenderedView, ...]
+
+
+def load_kept_scene(sequence_folder: Path) -> KeptScene:
+    """Reads the stages from the work area of the run that made a sequence.
+
+    Raises:
+        InputError: the sequence does not lie in its run's output folder, or its work area was freed.
+    """
+    folder = sequence_folder.resolve()
+    out = folder.parent.parent
+    work = out / WORK_FOLDER / folder.name
+    if not work.is_dir():
+        raise InputError(
+            f"the work area of '{sequence_folder}' is not kept (no {WORK_FOLDER}/{folder.name} in its output folder): "
+            "run the same perpetua generate again with a new --out, and no perpetua clean after it"
+        )
+    kept = {name: _load(work, name) for name in ("room", "routes", "actors", "cameras", "render")}
+    return KeptScene(
+        run=read_run(out),
+        room_number=_room_number(work),
+        room=kept["room"],
+        routes=kept["routes"],
+        actors=kept["actors"],
+        cameras=kept["cameras"],
+        views=kept["render"],
+    )
+
+
+def _load(work: Path, name: str) -> Any:
+    stage = next(stage for stage in STAGES if stage.name == name)
+    folder = StageFolder(work, stage.number, stage.name)
+    if folder.manifest() is None:
+        raise InputError(f"stage '{name}' is missing in '{work}': run the same perpetua generate again")
+    return codec.load(folder.final)
+
+
+def _room_number(work: Path) -> int:
+    manifest = StageFolder(work, STAGES[0].number, STAGES[0].name).manifest()
+    assert manifest is not None
+    return manifest.room
+
+
+def load_deep_scene(sequence_folder: Path) -> DeepScene:
+    """The meshes of a sequence, and what was rendered of them, for ``verify --deep``.
+
+    Raises:
+        InputError: the work area is not kept.
+    """
+    kept = load_kept_scene(sequence_folder)
+    return DeepScene(kept.room, kept.actors, tuple(view.object_index for view in kept.views))

@@ -1,0 +1,79 @@
+"""``perpetua tracks``: other tracks of a finished sequence, without rendering anything."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from perpetua.errors import InputError
+from perpetua.formats import EXPORTERS
+from perpetua.pipeline.kept import KeptScene, load_kept_scene
+from perpetua.pipeline.record import sequence_record
+from perpetua.pipeline.store import replace_folder
+from perpetua.seeding import StageSeed
+from perpetua.tracks.follow import TrackScene
+from perpetua.tracks.make import make_tracks
+from perpetua.tracks.motion import MOVING_M, travel_m
+from perpetua.tracks.pixels import make_pixel_tracks
+from perpetua.tracks.types import SequenceTracks
+
+
+@dataclass(frozen=True)
+class PixelChoice:
+    """Every ``step``-th pixel of one image."""
+
+    view: int
+    frame: int
+    step: int
+
+    @classmethod
+    def parse(cls, text: str) -> "PixelChoice":
+        """Reads "VIEW:FRAME:STEP".
+
+        Raises:
+            InputError: it is not three whole numbers.
+        """
+        parts = text.split(":")
+        if len(parts) != 3 or not all(part.isdecimal() for part in parts):
+            raise InputError(f"pixels are chosen as VIEW:FRAME:STEP, for example 0:12:4, not '{text}'")
+        return cls(*(int(part) for part in parts))
+
+
+def write_other_tracks(
+    sequence_folder: Path, target: Path, count: int, seed: int, pixels: PixelChoice | None
+) -> SequenceTracks:
+    """Writes the sequence once more with other tracks, a whole folder in the benchmark layout.
+
+    Args:
+        sequence_folder: a finished sequence whose work area is kept.
+        target: folder to write; must not exist.
+        count: tracks to draw, with the run's other settings.
+        seed: of the draw; the run's own seed and count give the sequence's own tracks.
+        pixels: follow these pixels instead of drawing.
+
+    Raises:
+        InputError: the work area is not kept, or ``target`` exists.
+        TrackError: too few points are seen.
+    """
+    if target.exists():
+        raise InputError(f"'{target}' exists: choose another --out, or remove it")
+    kept = load_kept_scene(sequence_folder)
+    tracks = _make(kept, count, seed, pixels)
+    # The record says what the tracks are, which for pixels nobody chose.
+    moving = float((travel_m(tracks.points.position_m) > MOVING_M).mean())
+    made = {"count": len(tracks.queries_xytv)} | ({} if pixels is None else {"dynamic_share": moving, "min_visible": 1})
+    config = kept.run.config
+    config = config.model_copy(update={"tracks": config.tracks.model_copy(update=made)})
+    record = sequence_record(config, StageSeed(seed, kept.room_number, "tracks"), kept.room, kept.routes, kept.actors)
+    partial = target.with_name(f".{target.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    EXPORTERS["tapvid_mv"]().write(partial, kept.room, kept.actors, kept.cameras, kept.views, tracks, record)
+    replace_folder(partial, target)
+    return tracks
+
+
+def _make(kept: KeptScene, count: int, seed: int, pixels: PixelChoice | None) -> SequenceTracks:
+    config = kept.run.config.tracks.model_copy(update={"count": count})
+    scene = TrackScene(kept.room, kept.actors, kept.cameras, kept.views, config)
+    if pixels is not None:
+        return make_pixel_tracks(scene, pixels.view, pixels.frame, pixels.step)
+    return make_tracks(scene, StageSeed(seed, kept.room_number, "tracks"))

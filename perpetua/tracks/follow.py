@@ -1,0 +1,60 @@
+"""Follows points of a scene: where they are at each frame, where they are seen, and where they are asked for."""
+
+import numpy as np
+from jaxtyping import Int64
+
+from perpetua.actors.types import ActorMesh
+from perpetua.cameras.types import CameraPath
+from perpetua.rendering.types import RenderedView
+from perpetua.rooms.types import Room
+from perpetua.tracks.config import TracksConfig
+from perpetua.tracks.queries import draw_queries, project_tracks
+from perpetua.tracks.sides import SideTable
+from perpetua.tracks.sight import SceneSight, hair_faces
+from perpetua.tracks.surface import BoundPoints, SceneMeshes, SurfacePoints, bind
+from perpetua.tracks.types import PointTracks, SequenceTracks
+from perpetua.tracks.visibility import Sightings, visible_in_views
+
+
+class TrackScene:
+    """Everything that decides where a point is seen.
+
+    Args:
+        room: its meshes as rendered.
+        actors: their meshes as rendered.
+        cameras: one per view, in the order of the views.
+        views: the rendered frames; arrays may lie on disk, and are read frame by frame.
+        config: the tracks section of the config.
+    """
+
+    def __init__(
+        self,
+        room: Room,
+        actors: tuple[ActorMesh, ...],
+        cameras: tuple[CameraPath, ...],
+        views: tuple[RenderedView, ...],
+        config: TracksConfig,
+    ) -> None:
+        self.actors, self.cameras, self.views, self.config = actors, cameras, views, config
+        self.meshes = SceneMeshes.of(room, actors)
+        self.frames = len(views[0].depth_m)
+        self.sight = SceneSight(self.meshes)
+        self._hair, self._sides = hair_faces(actors), SideTable(self.meshes)
+
+    def bind(self, points: SurfacePoints) -> BoundPoints:
+        """Points with their triangles."""
+        return bind(self.meshes, points)
+
+    def look(self, bound: BoundPoints, frames: Int64[np.ndarray, " S"]) -> Sightings:
+        """Where points are visible at some frames."""
+        sides = self._sides.of(bound.points)
+        return visible_in_views(bound, sides, self.sight, self._hair, self.cameras, self.views, frames, self.config)
+
+    def follow(self, points: SurfacePoints) -> SequenceTracks:
+        """The tracks of points, each of which must be visible somewhere."""
+        bound = self.bind(points)
+        position_m = bound.position_m(self.frames)
+        sightings = self.look(bound, np.arange(self.frames))
+        seen = project_tracks(position_m, self.cameras, sightings.visible)
+        tracks = PointTracks(position_m, points.object_index, points.face, points.barycentric)
+        return SequenceTracks(tracks, seen, draw_queries(seen), sightings.report)

@@ -1,0 +1,54 @@
+"""Tracks of the pixels of one image: what each shows, followed through the sequence."""
+
+import numpy as np
+
+from perpetua.errors import InputError, TrackError
+from perpetua.geometry.pinhole import unproject
+from perpetua.geometry.transforms import transform_points
+from perpetua.tracks.follow import TrackScene
+from perpetua.tracks.sight import NOTHING
+from perpetua.tracks.surface import SurfacePoints, plane_barycentric
+from perpetua.tracks.types import SequenceTracks
+
+
+def make_pixel_tracks(scene: TrackScene, view: int, frame: int, step: int) -> SequenceTracks:
+    """One track for every ``step``-th pixel of every ``step``-th row of an image, in that order.
+
+    Pixels that show nothing, and points that no view shows at any frame by the rule of
+    ``perpetua.tracks.visibility``, are left out.
+
+    Raises:
+        InputError: there is no such view or frame, or the step is not positive.
+        TrackError: the image shows nothing that can be followed.
+    """
+    if not (0 <= view < len(scene.views) and 0 <= frame < scene.frames and step >= 1):
+        raise InputError(
+            f"pixels must be of a view in 0..{len(scene.views) - 1} and a frame in 0..{scene.frames - 1}, every 1st or "
+            f"more, not view {view}, frame {frame}, every {step}"
+        )
+    points = _points(scene, view, frame, step)
+    seen = scene.look(scene.bind(points), np.arange(scene.frames)).visible.any(axis=(0, 1))
+    if not seen.any():
+        raise TrackError(f"no pixel of view {view}, frame {frame} shows a surface that can be followed: choose another")
+    return scene.follow(points.take(seen))
+
+
+def _points(scene: TrackScene, view: int, frame: int, step: int) -> SurfacePoints:
+    """The exact points where rays through pixel centres meet opaque meshes."""
+    camera = scene.cameras[view]
+    row, column = np.mgrid[: camera.intrinsics.height_px : step, : camera.intrinsics.width_px : step].reshape(2, -1)
+    pixel_px = np.stack([column, row], axis=1).astype(np.float64)
+    world_from_camera = camera.world_from_camera[frame]
+    eye_m = np.repeat(world_from_camera[None, :3, 3], len(pixel_px), axis=0)
+    direction = transform_points(world_from_camera, unproject(camera.intrinsics, pixel_px, np.ones(len(pixel_px))))
+    direction = direction - eye_m
+    hits = scene.sight.first_hit(frame, eye_m, direction)
+    met = hits.object_index != NOTHING
+    points = SurfacePoints(hits.object_index[met], hits.face[met], np.zeros((int(met.sum()), 3)))
+    unit = direction[met] / np.linalg.norm(direction[met], axis=1, keepdims=True)
+    place_m = eye_m[met] + hits.distance_m[met, None] * unit
+    weight = plane_barycentric(place_m, scene.bind(points).corner_m(frame))
+    sound = np.isfinite(weight).all(axis=1)
+    weight = np.clip(weight[sound], 0.0, None)
+    weight /= weight.sum(axis=1, keepdims=True)
+    return SurfacePoints(points.object_index[sound], points.face[sound], weight)
