@@ -10,6 +10,7 @@ import math
 
 import bpy
 from mathutils import Vector
+from opaque_materials import shader_trees
 
 Color = tuple[float, float, float]
 
@@ -18,8 +19,12 @@ MAX_SUN_W_M2 = 8.0
 EVENING_SUN_W_M2 = 0.8
 EVENING_SUN_COLOR: Color = (1.0, 0.46, 0.2)
 EVENING_SUN_ELEVATION_RAD = math.radians(9.0)
+# Infinigen's lamps go from candle red to welding blue; bulbs that one can buy lie between these (kelvins).
+MIN_LAMP_K, MAX_LAMP_K = 2900.0, 5500.0
 # Lamp power per square metre of floor: below the first a room is dim; a ceiling panel then brings it to the second.
 MIN_LAMP_W_M2, PANEL_LAMP_W_M2 = 1.2, 2.2
+# Lamps at full power would outshine the day that comes in at the windows.
+DAY_LAMP_SHARE = 0.35
 # What a room without lamps gets from its open doors and light surfaces, so that a picture shows more than noise.
 FILL_W_M2 = 0.35
 FILL_COLOR: Color = (0.85, 0.92, 1.0)
@@ -44,10 +49,17 @@ def set_light(
     inside = [lamp for lamp in lamps if lamp.data.type != "SUN" and not _is_portal(lamp)]
     _set_sun([lamp for lamp in lamps if lamp.data.type == "SUN"], daytime)
     _set_outdoors(daytime)
-    if lamps_on or not (has_windows or daytime != "day"):
+    for lamp in inside:
+        _limit_temperature(lamp.data)
+    daylight = daytime == "day" and has_windows
+    if lamps_on and daylight:
+        for lamp in inside:
+            lamp.data.energy *= DAY_LAMP_SHARE
+    if lamps_on or (daytime == "day" and not has_windows):
         power_w = sum(lamp.data.energy for lamp in inside)
-        if power_w < MIN_LAMP_W_M2 * floor_m2:
-            _add_panel(PANEL_LAMP_W_M2 * floor_m2 - power_w, (1.0, 1.0, 1.0), dimensions_m)
+        least, wanted = (FILL_W_M2, FILL_W_M2) if daylight else (MIN_LAMP_W_M2, PANEL_LAMP_W_M2)
+        if power_w < least * floor_m2:
+            _add_panel(wanted * floor_m2 - power_w, (1.0, 1.0, 1.0), dimensions_m)
         return
     bpy.data.batch_remove(inside)
     _add_panel(FILL_W_M2 * floor_m2, FILL_COLOR, dimensions_m)
@@ -55,6 +67,14 @@ def set_light(
 
 def _is_portal(lamp: bpy.types.Object) -> bool:
     return lamp.data.type == "AREA" and lamp.data.cycles.is_portal
+
+
+def _limit_temperature(lamp: bpy.types.Light) -> None:
+    for tree in shader_trees(lamp.node_tree) if lamp.use_nodes else ():
+        for node in tree.nodes:
+            if node.type == "BLACKBODY":
+                kelvins = node.inputs["Temperature"]
+                kelvins.default_value = min(max(kelvins.default_value, MIN_LAMP_K), MAX_LAMP_K)
 
 
 def _set_sun(suns: list[bpy.types.Object], daytime: str) -> None:

@@ -2,7 +2,7 @@
 """Lets things that hang a little in the air down on what is below them, and leaves out small things that cannot be.
 
 Infinigen places things by their unsubdivided meshes, so on a sofa whose seat is rounded in the picture a cushion may
-hang some centimetres above it.
+hang some centimetres above it. Ceiling lamps are lifted to the ceiling instead.
 """
 
 import bpy
@@ -13,6 +13,8 @@ from plain_meshes import world_triangles
 
 # What is closer than this to its support stays; what would fall further is not where it was meant to be.
 CLOSE_M, FURTHEST_M = 0.01, 0.15
+FURTHEST_LAMP_M = 0.6
+CEILING_LAMP = "ceiling_lamp"
 PLACES_PER_SIDE = 16
 MIN_SPACING_M = 0.01
 MAX_SURFACES = 8
@@ -29,6 +31,7 @@ def settle(things: list[bpy.types.Object], categories: list[str]) -> list[bpy.ty
         if category in SMALL | STANDING
     ]
     loose = [entry for entry in loose if len(entry[0])]
+    _lift_lamps([thing for thing, category in zip(things, categories, strict=True) if category == CEILING_LAMP])
     gone = []
     for vertices_m, thing, category in sorted(loose, key=lambda entry: (entry[0][:, 2].min(), entry[1].name)):
         gap_m = _gap_m(thing, vertices_m)
@@ -43,25 +46,35 @@ def settle(things: list[bpy.types.Object], categories: list[str]) -> list[bpy.ty
     return gone
 
 
-def _gap_m(thing: bpy.types.Object, vertices_m: np.ndarray) -> float:
-    """How far the thing would fall; 0 where something crosses its underside within reach."""
-    places_m = _underside_m(vertices_m) + _ASIDE_M
+def _lift_lamps(lamps: list[bpy.types.Object]) -> None:
+    for lamp in lamps:
+        gap_m = _gap_m(lamp, world_triangles(lamp)[0], up=True)
+        if CLOSE_M < gap_m <= FURTHEST_LAMP_M:
+            lamp.location.z += gap_m
+    bpy.context.view_layer.update()
+
+
+def _gap_m(thing: bpy.types.Object, vertices_m: np.ndarray, up: bool = False) -> float:
+    """How far the thing would fall (or rise); 0 where something crosses that side of it within reach."""
+    mirror = np.array([1.0, 1.0, -1.0 if up else 1.0])
+    places_m = _underside_m(vertices_m * mirror) * mirror + _ASIDE_M
+    along = Vector((0.0, 0.0, 1.0 if up else -1.0))
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    return min(_fall_m(depsgraph, thing, place_m) for place_m in places_m)
+    return min(_way_m(depsgraph, thing, Vector(place_m), along) for place_m in places_m)
 
 
-def _fall_m(depsgraph: bpy.types.Depsgraph, thing: bpy.types.Object, place_m: np.ndarray) -> float:
-    # From a little above, so that what the thing is sunk into or exactly rests on is met.
-    start = Vector(place_m) + Vector((0.0, 0.0, CLOSE_M))
+def _way_m(depsgraph: bpy.types.Depsgraph, thing: bpy.types.Object, place_m: Vector, along: Vector) -> float:
+    # From a little before, so that what the thing is sunk into or exactly rests on is met.
+    start = place_m - CLOSE_M * along
     travelled_m = 0.0
     for _ in range(MAX_SURFACES):
-        hit, where, _, _, other, _ = bpy.context.scene.ray_cast(depsgraph, start, Vector((0.0, 0.0, -1.0)))
+        hit, where, _, _, other, _ = bpy.context.scene.ray_cast(depsgraph, start, along)
         if not hit:
             return float("inf")
-        travelled_m += start.z - where.z
+        travelled_m += (where - start).length
         if other.name != thing.name:
             return max(0.0, travelled_m - CLOSE_M)
-        start = where - Vector((0.0, 0.0, _PAST_SURFACE_M))
+        start = where + _PAST_SURFACE_M * along
         travelled_m += _PAST_SURFACE_M
     return float("inf")
 

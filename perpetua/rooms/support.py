@@ -161,8 +161,13 @@ class _Scene:
         self._upward = normal[:, 2] > MIN_UPWARD_NORMAL * np.linalg.norm(normal, axis=1)
 
     def rests_on(self) -> Bool[np.ndarray, "N N"]:
-        """[i, j]: thing j lies within reach straight below (or a little above) the underside of thing i."""
-        return self._touches([_underside_m(thing.mesh) for thing in self.objects], _DOWN)
+        """[i, j]: thing j lies within reach straight below (or a little above) the underside of thing i.
+
+        The building rests on nothing.
+        """
+        nothing = np.zeros((0, 3))
+        undersides = [nothing if thing.category in BUILDING else _underside_m(thing.mesh) for thing in self.objects]
+        return self._touches(undersides, _DOWN)
 
     def parts_of_one(self) -> Bool[np.ndarray, "N N"]:
         """[i, j]: things i and j are parts of one piece of furniture."""
@@ -232,15 +237,28 @@ class _Scene:
 
 
 def _points_m(mesh: TriMesh) -> Float64[np.ndarray, "_ 3"]:
-    """Corners of a mesh, and places on its large triangles."""
+    """Corners of a mesh, and places on its long edges and large triangles."""
     corners_m = mesh.vertices_m[mesh.faces]
-    side_m = np.linalg.norm(corners_m - np.roll(corners_m, 1, axis=1), axis=2).max(axis=1)
+    normal = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
+    side_m = np.sqrt(np.linalg.norm(normal, axis=1))
     spacing_m = max(float(np.ptp(mesh.vertices_m, axis=0).max()) / PLACES_PER_SIDE, MIN_SPACING_M)
-    points_m = [mesh.vertices_m[np.unique(mesh.faces)]]
+    points_m = [mesh.vertices_m[np.unique(mesh.faces)], _along_edges_m(mesh, spacing_m)]
     for steps in (2, 4, 8, 16, 32):
         some = corners_m[(side_m > 0.5 * steps * spacing_m) & (side_m <= steps * spacing_m)]
         points_m.append(np.einsum("kc,fcx->fkx", _lattice(steps), some).reshape(-1, 3))
     return np.concatenate(points_m)
+
+
+def _along_edges_m(mesh: TriMesh, spacing_m: float) -> Float64[np.ndarray, "_ 3"]:
+    """Places on edges longer than the spacing: all that long slivers have."""
+    edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
+    edges = edges[np.linalg.norm(np.diff(mesh.vertices_m[edges], axis=1)[:, 0], axis=1) > spacing_m]
+    ends_m = mesh.vertices_m[np.unique(edges, axis=0)]
+    steps = np.ceil(np.linalg.norm(ends_m[:, 1] - ends_m[:, 0], axis=1) / spacing_m).astype(np.int64)
+    edge = np.repeat(np.arange(len(ends_m)), steps)
+    number = np.arange(len(edge)) - np.repeat(np.cumsum(steps) - steps, steps)
+    share = ((number + 0.5) / steps[edge])[:, None]
+    return np.asarray((1.0 - share) * ends_m[edge, 0] + share * ends_m[edge, 1])
 
 
 def _lattice(steps: int) -> Float64[np.ndarray, "K 3"]:

@@ -46,6 +46,8 @@ def settled():
         "vase": ("vase", box("vase", (-1, -1, 0.5), (-0.9, -0.9, 0.7))),
         "books": ("books", box("books", (-1, -1, 0.7), (-0.9, -0.9, 0.8))),
         "cabinet": ("cabinet", box("cabinet", (2, 2, 1.0), (2.5, 2.5, 1.5))),
+        "ceiling": ("ceiling", box("ceiling", (-3, -3, 2.7), (3, 3, 2.8))),
+        "lamp": ("ceiling_lamp", box("lamp", (1, -1, 2.3), (1.2, -0.8, 2.5))),
         "chair": ("chair", box("chair", (-2, -2, -0.005), (-1.5, -1.5, 0.8))),
     }
     bpy.context.view_layer.update()
@@ -169,6 +171,10 @@ def test_things_settle_on_what_is_below_them(answer: dict[str, Any]) -> None:
     assert moved["chair"] == moved["floor"] == moved["cabinet"] == 0.0
 
 
+def test_ceiling_lamps_are_lifted_to_the_ceiling(answer: dict[str, Any]) -> None:
+    assert answer["settled"]["moved"]["lamp"] == pytest.approx(0.2, abs=1e-4)
+
+
 def test_small_things_in_the_air_are_left_out_with_what_stands_on_them(answer: dict[str, Any]) -> None:
     assert answer["settled"]["gone"] == ["books", "vase"]
 
@@ -208,8 +214,9 @@ def test_lamps_are_off_when_wished_and_something_always_shines(answer: dict[str,
     lit = answer["lit"]
     for daytime in ("day", "evening", "night"):
         on, off = lit[f"{daytime} True True"]["lamps"], lit[f"{daytime} False True"]["lamps"]
-        assert on["lamp"] == 100.0 and "ceiling_panel" not in on
-        assert "lamp" not in off and 0.0 < off["ceiling_panel"] < 0.2 * on["lamp"]
+        # By day lamps are weaker than what comes in at the windows.
+        assert on["lamp"] == (35.0 if daytime == "day" else 100.0) and "ceiling_panel" not in on
+        assert "lamp" not in off and 0.0 < off["ceiling_panel"] < 0.2 * 100.0
         assert off["portal"] == on["portal"] == 0.0
     assert lit["day False False"]["lamps"]["lamp"] == 100.0
 

@@ -1,6 +1,5 @@
 """One real Infinigen room, made twice: the same bits, plain and opaque, exactly what its .blend renders."""
 
-import hashlib
 import json
 import subprocess
 import sys
@@ -9,10 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from perpetua.geometry.mesh import join
+from perpetua.geometry.raycast import Caster
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.rooms.acceptance import check_room
 from perpetua.rooms.config import RoomsConfig
+from perpetua.rooms.fingerprint import room_sha256
 from perpetua.rooms.infinigen import InfinigenRooms
 from perpetua.rooms.source import RoomWish
 from perpetua.rooms.types import Room
@@ -22,7 +24,7 @@ pytestmark = [pytest.mark.blender, pytest.mark.infinigen, pytest.mark.slow]
 
 CONFIG = RoomsConfig(kinds=("bathroom",), min_side_m=5.0, max_side_m=6.0)
 SEED = StageSeed(4, 0, "room")
-WISH = RoomWish("bathroom", (6.2, 6.6, 2.8), "day", True)
+WISH = RoomWish("bathroom", (6.2, 6.6, 2.8), "evening", True)
 
 # Opens a .blend as the render stage does, and says what is in it.
 INSPECT = """
@@ -54,6 +56,7 @@ answer = {
     "other": sorted({thing.type for thing in bpy.data.objects} - {"MESH", "LIGHT"}),
     "displacement": sorted({material.displacement_method for material in bpy.data.materials}),
     "lamp_w": sum(lamp.energy for lamp in bpy.data.lights if lamp.type != "SUN"),
+    "sun_w_m2": [lamp.energy for lamp in bpy.data.lights if lamp.type == "SUN"],
     "world": bpy.context.scene.world is not None,
     "unpacked": [i.name for i in bpy.data.images if i.users and i.type == "IMAGE" and i.packed_file is None],
     "libraries": len(bpy.data.libraries),
@@ -61,15 +64,6 @@ answer = {
 }
 open(sys.argv[2], "w").write(json.dumps(answer))
 """
-
-
-def _mesh_hash(room: Room) -> str:
-    digest = hashlib.sha256()
-    for thing in room.objects:
-        digest.update(f"{thing.object_index} {thing.name} {thing.category}".encode())
-        digest.update(thing.mesh.vertices_m.tobytes())
-        digest.update(thing.mesh.faces.tobytes())
-    return digest.hexdigest()
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +85,7 @@ def blend(rooms: tuple[Room, Room], tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def test_one_seed_gives_the_same_room_in_two_processes(rooms: tuple[Room, Room]) -> None:
-    assert _mesh_hash(rooms[0]) == _mesh_hash(rooms[1])
+    assert room_sha256(rooms[0]) == room_sha256(rooms[1])
 
 
 def test_the_room_is_acceptable_and_origin_is_on_its_floor(rooms: tuple[Room, Room]) -> None:
@@ -133,6 +127,30 @@ def test_the_blend_is_plain_and_complete(blend: dict[str, Any]) -> None:
 def test_no_surface_lets_a_camera_ray_through(blend: dict[str, Any]) -> None:
     see_through = {"SEE_THROUGH", "BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION", "VOLUME_ABSORPTION"}
     assert see_through.isdisjoint(blend["shaders"])
+
+
+def test_the_outline_runs_along_the_walls(rooms: tuple[Room, Room]) -> None:
+    room = rooms[0]
+    walls = Caster(join([thing.mesh for thing in room.objects if thing.category == "wall"]))
+    corners_m = np.column_stack([room.floor_polygon_m, np.full(len(room.floor_polygon_m), 0.05)])
+    assert walls.closest_distance(corners_m).max() < 0.01
+    # The middle of each side too, unless a door or a window reaches the floor there.
+    middle_m = 0.5 * (corners_m + np.roll(corners_m, -1, axis=0))
+    assert np.median(walls.closest_distance(middle_m)) < 0.01
+
+
+def test_infinigens_colliders_are_near_what_is_rendered(
+    rooms: tuple[Room, Room],
+) -> None:
+    assert rooms[0].blend_path is not None
+    gap = json.loads((rooms[0].blend_path.parent / "collider_gap.json").read_text(encoding="utf-8"))
+    assert gap["median_m"] < 0.005
+    assert gap["median_m"] <= gap["p95_m"] <= gap["p99_m"] <= gap["max_m"]
+    assert 0.0 <= gap["share_beyond_2_cm"] < 0.3
+
+
+def test_the_evening_sun_is_low(blend: dict[str, Any]) -> None:
+    assert blend["sun_w_m2"] == [pytest.approx(0.8)]
 
 
 def test_lamps_are_on(rooms: tuple[Room, Room], blend: dict[str, Any]) -> None:
