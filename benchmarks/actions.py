@@ -25,8 +25,10 @@ from perpetua.seeding import StageSeed
 
 FPS = 24.0
 MOMENTS = 6
-TILE_PX = (150, 210)
-ROWS_PER_SHEET = 12
+TILE_PX = (190, 260)
+# Frames of a strip before and after its main moment.
+EITHER_SIDE = 32
+ROWS_PER_SHEET = 7
 SPEEDS_MPS = {"stand": 0.0, "stroll": 0.7, "walk": 1.2, "brisk": 1.7, "jog": 2.7}
 GREY = Material("grey", (0.5, 0.5, 0.5))
 
@@ -41,7 +43,10 @@ def box(low_m: tuple[float, float, float], high_m: tuple[float, float, float]) -
 
 def stage_room(seat_m: float | None = None) -> Room:
     """A bare floor, with a shelf to point at, and a chair at x = 0 that faces +X where ``seat_m`` is its height."""
-    things = [("floor", box((-30.0, -30.0, -0.1), (30.0, 30.0, 0.0))), ("shelf", box((1.6, 1.9, 0.0), (2.4, 2.2, 1.9)))]
+    things = [
+        ("floor", box((-30.0, -30.0, -0.1), (30.0, 30.0, 0.0))),
+        ("shelf", box((1.6, -1.6, 0.0), (2.4, -1.3, 1.9))),
+    ]
     if seat_m is not None:
         chair = [box((-0.22, -0.23, 0.0), (0.24, 0.23, seat_m)), box((-0.25, -0.23, 0.0), (-0.22, 0.23, seat_m + 0.45))]
         things[1] = ("chair", join(chair))
@@ -123,9 +128,17 @@ def action_strips(bodies: tuple[Body, ...], names: list[str]) -> list[np.ndarray
     rows = []
     for index, name in enumerate(names):
         room = stage_room()
-        mesh = act(bodies[index % len(bodies)], straight(0.0, 6.0, name), room, 3 + index)
-        rows.append(strip(name, mesh, room, list(np.linspace(4, 139, MOMENTS).astype(int)), 0.55))
+        mesh = act(bodies[index % len(bodies)], straight(0.0, 10.0, name), room, 3 + index)
+        rows.append(strip(name, mesh, room, eventful_frames(mesh), 0.55))
     return rows
+
+
+def eventful_frames(mesh: ActorMesh) -> list[int]:
+    """Moments around the one at which the body is farthest from how it mostly is."""
+    places_m = mesh.vertices_m[:, ::37]
+    away_m = np.percentile(np.linalg.norm(places_m - np.median(places_m, axis=0), axis=2), 98, axis=1)
+    middle = int(np.clip(away_m.argmax(), EITHER_SIDE, len(away_m) - 1 - EITHER_SIDE))
+    return np.linspace(middle - EITHER_SIDE, middle + EITHER_SIDE, MOMENTS).astype(int).tolist()
 
 
 def pace_strips(bodies: tuple[Body, ...]) -> list[np.ndarray]:

@@ -60,8 +60,8 @@ class RoutesConfig(Section):
     max_acceleration_mps2: float = Field(5.0, gt=0.0, le=20.0, description="hard limit of acceleration, m/s^2")
     max_turn_rate_radps: float = Field(3.2, gt=0.2, le=10.0, description="hard limit of the turn rate, rad/s")
     separation_m: float = Field(0.75, ge=0.2, le=3.0, description="least distance between two body axes, metres")
-    learning_rate: float = Field(0.02, gt=0.0, le=1.0, description="Adam's first step size, metres and radians")
-    steps: int = Field(400, ge=10, le=10000, description="Adam steps")
+    learning_rate: float = Field(0.05, gt=0.0, le=1.0, description="Adam's first step size, metres and radians")
+    steps: int = Field(300, ge=10, le=10000, description="Adam steps")
     weights: RouteWeights = Field(default_factory=RouteWeights)
     max_redraws: int = Field(20, ge=0, le=500, description="new walks tried when a route breaks a limit")
 
@@ -104,20 +104,28 @@ class ValidationConfig(Section):
     max_slide_mps: float = Field(
         0.04, gt=0.0, le=1.0, description="highest 95th percentile of the speed of a sole while it stands, m/s"
     )
+    max_median_slide_mps: float = Field(
+        0.01, gt=0.0, le=1.0, description="highest median of the speed of a sole while it stands, m/s"
+    )
     max_sole_penetration_m: float = Field(
-        0.035, gt=0.0, le=0.2, description="deepest sole in the floor or in the edge of a rug, metres"
+        0.01, gt=0.0, le=0.2, description="depth of soles in the floor that 99% of standing ones stay under, metres"
     )
     max_floating_m: float = Field(
-        0.035, gt=0.0, le=0.2, description="highest sole above the floor it stands on, metres"
+        0.015, gt=0.0, le=0.2, description="height over the floor that 99% of standing soles stay under, metres"
     )
-    max_scene_depth_m: float = Field(0.08, gt=0.0, le=1.0, description="deepest body in furniture or walls, metres")
-    max_actor_overlap_m: float = Field(0.03, ge=0.0, le=1.0, description="deepest actor in another, metres")
-    max_path_error_m: float = Field(0.15, gt=0.0, le=1.0, description="farthest pelvis from its route, metres")
+    max_scene_depth_m: float = Field(0.02, gt=0.0, le=1.0, description="deepest body in furniture or walls, metres")
+    max_actor_overlap_m: float = Field(0.005, ge=0.0, le=1.0, description="deepest actor in another, metres")
+    max_path_error_m: float = Field(
+        0.15, gt=0.0, le=1.0, description="farthest pelvis from its route, metres, except while it sits"
+    )
+    max_joint_excess_rad: float = Field(
+        0.15, gt=0.0, le=3.2, description="how far a joint may be beyond what people can do, radians"
+    )
     step_m: float = Field(
         0.1, ge=0.0, le=0.3, description="what stands no higher than this on the floor is stepped over, metres"
     )
     frames: int = Field(
-        60, ge=2, le=100_000, description="frames in which bodies are checked against their surroundings"
+        240, ge=2, le=100_000, description="frames in which bodies are checked against their surroundings"
     )
     vertices: int = Field(2000, ge=100, le=1_000_000, description="vertices of a body that are checked in a frame")
 

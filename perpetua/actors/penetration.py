@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from perpetua.actors.types import BODY_PARENTS, ActorMesh
+from perpetua.actors.types import BODY_JOINTS, BODY_PARENTS, ActorMesh
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.raycast import Caster
 from perpetua.rooms.types import Room
@@ -125,6 +125,12 @@ def overlap_m(
     surface = Caster(TriMesh(other.vertices_m[frame].astype(np.float64), other.faces))
     crossings = _crossings(surface, probe.anchors_m(joint_m, frames), skin_m)
     return float(_behind_m(crossings, skin_m[crossings.row, crossings.column]).max(initial=0.0))
+
+
+def bones_ending_at(joints: tuple[str, ...]) -> list[int]:
+    """Indices of the bones that lead to some joints, as in ``Probe.bone_of``; a hand belongs to its wrist's."""
+    wanted = {BODY_JOINTS.index(name) for name in joints}
+    return [index for index, (_, joint) in enumerate(_BONES) if joint in wanted]
 
 
 def _bone_ends_m(

@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from perpetua.actors.assembly import assemble_actors, draw_bodies
+from perpetua.actors.assembly import assemble_actors, draw_bodies, measured_skeletons
 from perpetua.actors.bodies.source import Body
 from perpetua.actors.casting import action_descriptions
 from perpetua.actors.config import ActorsConfig
@@ -180,7 +180,7 @@ def _motion_settings(config: Config) -> dict[str, Any]:
 
 
 def _motion(context: StageContext) -> tuple[BodyMotion, ...]:
-    skeletons = tuple(body.skeleton for body in _bodies(context))
+    skeletons = measured_skeletons(_bodies(context))
     routes = context.many("routes", Route)
     config = context.config
     room = context.one("room", Room)
@@ -317,8 +317,8 @@ STAGES = (
         _routes,
         redraw=_every_time,
     ),
-    Stage(40, "motion", 1, ("room", "routes"), _motion_settings, _motion),
-    Stage(50, "actors", 1, ("room", "routes", "motion"), _settings("actors", _FPS), _actors),
+    Stage(40, "motion", 2, ("room", "routes"), _motion_settings, _motion),
+    Stage(50, "actors", 2, ("room", "routes", "motion"), _settings("actors", _FPS), _actors),
     Stage(
         60,
         "cameras",

@@ -124,7 +124,7 @@ def test_a_bump_in_the_way_is_measured_to_the_centimetre() -> None:
     mesh, motion, route = _walker(0)
     outermost_m = float(mesh.vertices_m[..., 1].min())
     wall = box((20.0, 0.5, 2.0), (0.0, outermost_m + 0.03 - 0.25, 1.2))
-    config = ValidationConfig(frames=200, vertices=100_000)
+    config = ValidationConfig(frames=200, vertices=100_000, max_scene_depth_m=0.05)
     depth = _validate([(mesh, motion, route)], _room(("wall_01", wall)), config).actors[0].scene_depth
     assert depth.place == "'wall_01'" and 0.02 < depth.value_m < 0.031
 
@@ -136,7 +136,7 @@ def test_what_is_stepped_over_or_stood_on_is_no_obstacle() -> None:
 
 
 def test_actors_that_go_through_each_other_are_named_with_frame_and_depth() -> None:
-    with pytest.raises(ActorError, match=r"actors 0 and 1 are 0\.\d+ m in each other at frame \d+; at most 0.03 m"):
+    with pytest.raises(ActorError, match=r"actors 0 and 1 are 0\.\d+ m in each other at frame \d+; at most 0.005 m"):
         _validate([_walker(0), _walker(1, 0.3)], _room())
 
 

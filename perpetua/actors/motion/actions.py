@@ -125,7 +125,8 @@ def perform(description: str) -> Performance:
             performance = replace(
                 performance, lean_rad=performance.lean_rad + lean_rad, arm_swing=performance.arm_swing * swing
             )
-        for action in meant:
+        known = {action.verbs for action in performance.actions}
+        for action in (action for action in meant if action.verbs not in known):
             performance = _with_action(performance, action, stems)
     if not understood:
         near = difflib.get_close_matches(description.lower(), ACTIONS, n=3, cutoff=0.0)

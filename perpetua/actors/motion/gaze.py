@@ -29,8 +29,8 @@ _WORTH_POINTING_AT = frozenset(
         "wardrobe",
     )
 )
-# A thing is pointed at from within this angle of straight ahead.
-_CONE_RAD = 1.1
+# A thing is pointed at from within these angles of straight ahead: to the arm's own side and to the other.
+_OWN_SIDE_RAD, _OTHER_SIDE_RAD = 1.3, 0.3
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,16 @@ def aim_m(route: Route, room: Room, fps: float, time_s: Float64[np.ndarray, " N"
 
 
 def aim_share(
-    target_m: Float64[np.ndarray, "N 3"], eye_m: Float64[np.ndarray, "N 3"], heading_rad: Float64[np.ndarray, " N"]
+    side: str,
+    target_m: Float64[np.ndarray, "N 3"],
+    eye_m: Float64[np.ndarray, "N 3"],
+    heading_rad: Float64[np.ndarray, " N"],
 ) -> Float64[np.ndarray, " N"]:
-    """From 0 (behind) to 1 (in front): whether a target can be pointed at."""
+    """From 0 (behind) to 1 (in front): whether the left or right hand can point at a target."""
     yaw_rad, _ = _towards(target_m, eye_m, heading_rad)
-    return 1.0 - smoothstep((np.abs(yaw_rad) - _CONE_RAD) / 0.5)
+    outward_rad = yaw_rad if side == "left" else -yaw_rad
+    too_far = np.maximum((outward_rad - _OWN_SIDE_RAD) / 0.5, (-outward_rad - _OTHER_SIDE_RAD) / 0.5)
+    return 1.0 - smoothstep(too_far)
 
 
 def _thing_m(route: Route, room: Room) -> Float64[np.ndarray, "3"]:

@@ -14,7 +14,8 @@ from perpetua.actors.types import Skeleton
 
 _ON_THIGH = HandPose((0.4, 0.0, -0.6), (-0.4, 1.0, -0.2), (0.1, 0.0, -1.0), 0.1, "relaxed")
 # The elbow of a jogger.
-_JOG_BEND_RAD, _JOG_SWING = 1.5, 0.75
+_JOG_BEND_RAD, _JOG_SWING = 1.6, 0.75
+_HANGS = 1.0
 
 
 @dataclass(frozen=True)
@@ -22,14 +23,15 @@ class Limbs:
     """What arms go along with, over time.
 
     ``lead_m`` is how far the foot of the other side is ahead, ``run`` goes from walking (0) to running (1), ``seated``
-    from standing (0) to sitting (1); ``thigh`` is where a wrist rests on the thigh and ``aim`` where the pointing wrist
-    is, both from the shoulder in the chest's axes (forward, outward, up), lengths of the arm; ``aim_share`` is 0 where
-    there is nothing to point at.
+    from standing (0) to sitting (1); ``lean_rad`` is how far actions and a seat lean the trunk forward. ``thigh`` is
+    where a wrist rests on the thigh and ``aim`` where the pointing wrist is, both from the shoulder in the chest's axes
+    (forward, outward, up), lengths of the arm; ``aim_share`` is 0 where there is nothing to point at.
     """
 
     lead_m: Float64[np.ndarray, " N"]
     run: Float64[np.ndarray, " N"]
     seated: Float64[np.ndarray, " N"]
+    lean_rad: Float64[np.ndarray, " N"]
     thigh: Float64[np.ndarray, "N 3"]
     aim: Float64[np.ndarray, "N 3"]
     aim_share: Float64[np.ndarray, " N"]
@@ -102,7 +104,8 @@ def _pose(act: Act | None, side: str) -> HandPose | None:
 
 def _swinging(side: str, style: GaitStyle, arm_swing: float, limbs: Limbs) -> Arm:
     swing_rad = arm_swing * style.arm_swing_rad_per_m * limbs.lead_m * (1.0 - (1.0 - _JOG_SWING) * limbs.run)
-    forward_rad = swing_rad + 0.05 - 0.12 * limbs.run
+    # Arms hang down, not along a trunk that bows.
+    forward_rad = swing_rad + 0.05 - 0.12 * limbs.run + _HANGS * np.maximum(limbs.lean_rad, 0.0)
     bend_rad = np.clip(style.elbow_rad + 0.4 * np.maximum(swing_rad, -0.2), 0.08, 1.2)
     bend_rad = bend_rad + limbs.run * (_JOG_BEND_RAD + 0.35 * swing_rad - bend_rad)
     return hanging_arm(side, forward_rad, style.arm_abduction_rad, bend_rad)

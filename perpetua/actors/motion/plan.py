@@ -1,6 +1,7 @@
 """The motion of every actor along its route."""
 
 from perpetua.actors.config import MotionConfig
+from perpetua.actors.motion.clearing import clear_arms
 from perpetua.actors.motion.source import MOTION_SOURCES
 from perpetua.actors.types import BodyMotion, Route, Skeleton
 from perpetua.rooms.types import Room
@@ -15,7 +16,7 @@ def make_motions(
     config: MotionConfig,
     seed: StageSeed,
 ) -> tuple[BodyMotion, ...]:
-    """The motion of every actor along its route.
+    """The motion of every actor along its route, with arms kept off the room and each other.
 
     Args:
         routes: one per actor.
@@ -29,6 +30,7 @@ def make_motions(
         ConfigError: an unknown motion source.
     """
     source = MOTION_SOURCES[config.source]()
-    return tuple(
+    made = tuple(
         source.make(route, skeleton, room, fps, config, seed) for route, skeleton in zip(routes, skeletons, strict=True)
     )
+    return clear_arms(made, skeletons, room)

@@ -250,7 +250,7 @@ def _enter_arm(
     clock: _Clock,
 ) -> None:
     """Adds an arm's rotations."""
-    limbs = _limbs(rotations, side, walker, pelvis_m, stride, clock)
+    limbs = _limbs(rotations, side, walker, pelvis_m, stride, score, clock)
     arm = make_arm(side, walker.skeleton, walker.style, walker.performance.arm_swing, limbs, act, score.shrug_rad)
     rotations[f"{side}_collar"] = rotations["spine3"] @ arm.collar
     rotations[f"{side}_shoulder"] = rotations[f"{side}_collar"] @ arm.shoulder
@@ -264,6 +264,7 @@ def _limbs(
     walker: _Walker,
     pelvis_m: Float64[np.ndarray, "N 3"],
     stride: _Stride,
+    score: Score,
     clock: _Clock,
 ) -> Limbs:
     skeleton, time_s = walker.skeleton, clock.time_s
@@ -284,9 +285,10 @@ def _limbs(
         gaussian_filter1d(lead_m, 0.06 / clock.step_s),
         walker.path.run_share(time_s),
         seated_share(walker.sittings, time_s),
+        score.lean_rad - walker.performance.lean_rad + sitting_lean_rad(walker.sittings, time_s),
         wrist_from(side, skeleton, thigh_m, shoulder_m, chest),
         0.95 * aim / np.maximum(np.linalg.norm(aim, axis=1, keepdims=True), 1e-6),
-        aim_share(target_m, eye_m, heading_rad),
+        aim_share(side, target_m, eye_m, heading_rad),
     )
 
 

@@ -85,7 +85,7 @@ _LOOK = "look glance gaze watch peer stare"
 _HAND = "hand put rest keep clasp hold"
 _DOWN, _UP, _IN, _AHEAD = (0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)
 _BACK = (-1.0, 0.0, 0.0)
-_HANDSET = HandPose((0.20, -0.02, 0.17), (0.25, 0.6, -1.0), (-0.3, -1.0, 0.1), 0.0, "grip")
+_HANDSET = HandPose((0.15, 0.02, 0.11), (-0.5, 0.3, -1.0), (-0.3, -1.0, 0.1), 0.0, "grip")
 _SCREEN = HandPose((0.45, -0.24, -0.16), (-0.2, 0.45, -1.0), (-0.8, -0.2, 0.6), 0.1, "grip")
 _WAVE = HandPose(
     (0.30, 0.24, 0.30), (0.0, 0.8, -1.0), _AHEAD, 0.0, "flat", swing=(0.0, 0.10, 0.0), beat_rad=0.0, swing_hz=1.6
@@ -135,8 +135,8 @@ ACTIONS: dict[str, Action] = {
     "cross the arms": Action("cross fold", "arm", *_CROSSED, rise_s=0.9),
     "hug oneself": Action(
         "hug embrace shiver freeze", "",
-        HandPose((0.44, -0.66, -0.14), (0.3, 0.6, -1.0), _BACK, 0.3),
-        HandPose((0.32, -0.66, -0.26), (0.3, 0.6, -1.0), _BACK, 0.3),
+        HandPose((0.44, -0.50, -0.16), (0.3, 0.6, -1.0), _BACK, 0.3),
+        HandPose((0.33, -0.50, -0.28), (0.3, 0.6, -1.0), _BACK, 0.3),
         move=Move(lean=0.08, shrug=0.15), hold_s=(3.0, 6.0), pause_s=(1.5, 3.0), rise_s=0.9,
     ),
     "hands on the hips": Action(_HAND, "hip waist", *_both(_HIP), rise_s=0.8),
@@ -246,14 +246,14 @@ ACTIONS: dict[str, Action] = {
     "bend down": Action(
         "bend pick stoop", "",
         HandPose((0.62, -0.02, -0.72), (-0.3, 0.6, 0.2), _IN, 0.1, "relaxed"),
-        move=Move(lean=0.95, drop=0.22, head_pitch=0.2), hold_s=(0.9, 1.6), pause_s=(2.5, 4.5), rise_s=1.0,
+        move=Move(lean=0.85, drop=0.2, head_pitch=0.0), hold_s=(0.9, 1.6), pause_s=(2.5, 4.5), rise_s=1.0,
         standing=True,
     ),
     "crouch and tie a shoe": Action(
         "crouch squat kneel tie", "",
         *_both(HandPose((0.62, -0.16, -0.60), (-0.2, 0.9, 0.1), _IN, 0.2, "grip",
                                   swing=(0.02, 0.03, 0.02), swing_hz=1.1, lag=0.4)),
-        move=Move(lean=0.65, drop=0.48, head_pitch=0.2), hold_s=(2.0, 3.2), pause_s=(2.5, 4.5), rise_s=1.1,
+        move=Move(lean=0.45, drop=0.36, head_pitch=0.1), hold_s=(2.0, 3.2), pause_s=(2.5, 4.5), rise_s=1.1,
         standing=True,
     ),
     "reach up": Action(
