@@ -47,7 +47,7 @@ def test_words_that_state_a_pace_are_kept_and_given_descriptions_are_all_used() 
 
 def test_paces_come_in_their_shares() -> None:
     shares = PaceShares(stand=0.1, stroll=0.2, walk=0.3, brisk=0.2, jog=0.2)
-    roles = [role for room in range(150) for role in cast_actors(4, MotionConfig(), shares, 4, StageSeed(5, room, "r"))]
+    roles = [role for room in range(60) for role in cast_actors(4, MotionConfig(), shares, 4, StageSeed(5, room, "r"))]
     assert all(stated_paces(role.description) in (frozenset(), frozenset(role.paces)) for role in roles)
     counts = Counter(role.paces[0] for role in roles if len(role.paces) == 1)
     assert sum(counts.values()) > 0.8 * len(roles)

@@ -63,7 +63,7 @@ def finely(values: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def routes() -> tuple[Route, ...]:
-    return plan_routes(ROOM, GRID, ActorsConfig(), 36, 12.0, SEED)
+    return plan_routes(ROOM, GRID, ActorsConfig(routes=RoutesConfig(steps=150)), 36, 12.0, SEED)
 
 
 def test_one_route_per_actor_with_a_place_per_frame(routes: tuple[Route, ...]) -> None:
@@ -130,7 +130,7 @@ def test_pauses_look_at_what_they_are_about() -> None:
 
 
 def test_routes_stand_on_the_rug_and_on_the_floor() -> None:
-    routes = plan_routes(ROOM, GRID, ActorsConfig(count=2), 60, 12.0, SEED)
+    routes = plan_routes(ROOM, GRID, ActorsConfig(count=2, routes=RoutesConfig(steps=100)), 60, 12.0, SEED)
     places_m = np.concatenate([route.position_m for route in routes])
     on_rug, off_rug = places_m[:, 1] > 1.06, places_m[:, 1] < 0.94
     assert on_rug.any()
@@ -158,7 +158,7 @@ def test_short_and_slow_sequences(frames: int, fps: float) -> None:
 
 
 def test_too_many_actors_get_a_clear_error() -> None:
-    config = ActorsConfig(count=16, routes=RoutesConfig(separation_m=1.8, steps=10, max_redraws=1))
+    config = ActorsConfig(count=9, routes=RoutesConfig(separation_m=2.5, steps=10, max_redraws=0))
     with pytest.raises(RouteError, match=r"route of actor \d+ .* is required: lower actors.count or choose a larger"):
         plan_routes(ROOM, GRID, config, 12, 12.0, SEED)
 

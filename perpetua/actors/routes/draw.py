@@ -16,7 +16,7 @@ from perpetua.navigation.walks import SEAT_WAY_M, Manner, random_walk
 from perpetua.seeding import StageSeed
 
 # Of this many walks, the one that keeps clear of the other actors best and gets its pace is taken.
-WALKS_PER_ACTOR = 6
+WALKS_PER_ACTOR = 10
 STARTS = 48
 # Someone who is about to sit down stands so far before the middle of the seat, on free floor within a tolerance.
 BEFORE_SEAT_M = 0.45
@@ -114,13 +114,13 @@ def _start(
 
 
 def _crowding(walk: Walk, others: list[Walk], separation_m: float) -> float:
-    """How deep and how long a walk cuts into the space around others' walks; 1 for a full overlap all the time."""
+    """How deep and how long a walk cuts into the space around others' walks."""
     wanted_m = 1.5 * separation_m
     overlaps = [
         np.square(np.maximum(1.0 - np.linalg.norm(walk.position_m - other.position_m, axis=1) / wanted_m, 0.0)).mean()
         for other in others
     ]
-    return 20.0 * float(sum(overlaps))
+    return 40.0 * float(sum(overlaps))
 
 
 def _slowness(walk: Walk, manner: Manner, step_s: float) -> float:

@@ -11,7 +11,7 @@ from torch import Tensor
 TINY_M2 = 1e-8
 REVISIT_M = 0.5
 REVISIT_S = 2.0
-MAX_REVISIT_SAMPLES = 256
+MAX_REVISIT_SAMPLES = 96
 
 
 def sample_bilinear(

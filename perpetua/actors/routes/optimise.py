@@ -19,9 +19,11 @@ from perpetua.optimisation import deterministic_torch, minimise
 # Wishes are a little stricter than the limits, so that the optimum lies inside them.
 CLEARANCE_MARGIN_M = 0.05
 SEPARATION_MARGIN_M = 0.1
-LIMIT_SHARE = 0.75
+# People seldom go to these shares of the hard limits.
+ACCELERATION_SHARE, TURN_SHARE = 0.45, 0.4
+SPEED_SHARE = 0.92
 # Nobody goes much faster than the fastest of its paces.
-SPEED_SHARE, PACE_EXCESS = 0.92, 1.15
+PACE_EXCESS = 1.15
 # A shift of a path is a sum of bells of this width over time, so that neighbours move together and stay smooth.
 BELL_S = 0.2
 # Around a pause the clock of the bells slows down within this time, and during it stands.
@@ -94,8 +96,8 @@ def weighted_losses(
     walks, step_s = plan.walks, plan.walks.step_s
     start_m, start_rad = torch.from_numpy(walks.position_m), torch.from_numpy(walks.heading_rad)
     limit_mps = torch.from_numpy(np.minimum(plan.highest_mps, SPEED_SHARE * config.max_speed_mps))
-    acceleration_mps2 = LIMIT_SHARE * config.max_acceleration_mps2
-    turn_rate_radps = LIMIT_SHARE * config.max_turn_rate_radps
+    acceleration_mps2 = ACCELERATION_SHARE * config.max_acceleration_mps2
+    turn_rate_radps = TURN_SHARE * config.max_turn_rate_radps
     pausing = torch.from_numpy(plan.pausing.astype(np.float64))
     terms = {
         "clearance": losses.clearance_loss(field.at(position_m), field.wanted_m),

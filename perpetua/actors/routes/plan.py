@@ -50,16 +50,20 @@ def plan_routes(
         ConfigError: there is no list of descriptions to draw from.
     """
     refinement = max(1, math.ceil(MIN_RATE_HZ / fps))
-    step_s = 1.0 / (fps * refinement)
-    steps = max((frames - 1) * refinement + 1, math.ceil(MIN_SECONDS / step_s))
-    floor = WalkableFloor(grid)
-    stage = Stage(floor, find_spots(room, floor), seat_spots(find_seats(room), floor), steps, step_s)
+    stage = set_stage(room, grid, (frames - 1) * refinement + 1, fps * refinement)
     roles = cast_actors(config.count, config.motion, config.routes.paces, len(stage.seats), seed)
     walks, paths = _feasible_walks(room, stage, roles, config, refinement, seed)
     return tuple(
         _route(actor, role, walk, paths, grid, frames, refinement)
         for actor, (role, walk) in enumerate(zip(roles, walks, strict=True))
     )
+
+
+def set_stage(room: Room, grid: NavGrid, steps: int, rate_hz: float) -> Stage:
+    """A room as walks see it, for at least so many steps at a rate."""
+    floor = WalkableFloor(grid)
+    seats = seat_spots(find_seats(room), floor)
+    return Stage(floor, find_spots(room, floor), seats, max(steps, math.ceil(MIN_SECONDS * rate_hz)), 1.0 / rate_hz)
 
 
 def _feasible_walks(
