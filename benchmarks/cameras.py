@@ -12,6 +12,7 @@ import argparse
 import cProfile
 import pstats
 import resource
+import sys
 import time
 from pathlib import Path
 
@@ -181,6 +182,7 @@ def _print_ablation(folders: list[Path], config: CamerasConfig, seed: int) -> No
                 paths = make_paths(scene, draft, optimise_paths(problem, variant), 0)
             row = figures(paths, draft.focus(scene), actors, mesh, FPS) | clearances(paths, actors, mesh)
             found[name].append(row | {"height_off_m": _height_off_m(paths, draft)})
+            print(f"{folder.name}: {name} measured", file=sys.stderr, flush=True)
     _print_ablation_table(found)
 
 

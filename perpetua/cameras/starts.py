@@ -32,6 +32,8 @@ ROOMY_M = 0.2
 EDGE_SAMPLES = 7
 BLOCKED_COST = 50.0
 HIDDEN_COST = 6.0
+SHADOWED_COST = 3.0
+SHADOW_M = 0.3
 COVERAGE_GAIN = 3.0
 AZIMUTH_COST = 1.5
 # Steps of a view that stands still cost this much for each metre.
@@ -120,6 +122,7 @@ class _View:
         azimuth = _azimuth_cost(self.places_m, wish, scene.moments)
         self.place_cost = _at_knots(crowd, np.max) + AZIMUTH_COST * azimuth[:, None]
         self.size_cost = _size_cost(self.places_m, wish, scene.moments)
+        self.size_cost += SHADOWED_COST * _shadowed(self.places_m, scene.moments)
         step_m = self.places_m[None] - self.places_m[:, None]
         length_m = np.linalg.norm(step_m, axis=-1)
         self.unit = step_m / np.maximum(length_m, 1e-6)[..., None]
@@ -205,6 +208,20 @@ def _in_image(
     in_camera_m = np.einsum("nfji,nfalj->nfali", world_from_camera[..., :3, :3], offset_m)
     reach = IMAGE_SHARE * np.tan(0.5 * wish.fov_rad) * np.array([1.0, aspect]) * in_camera_m[..., 2:]
     return np.asarray((np.abs(in_camera_m[..., :2]) < reach).all(axis=-1))
+
+
+def _shadowed(places_m: Float64[np.ndarray, "N 3"], bounds: ActorBounds) -> Bool[np.ndarray, "N F A"]:
+    """Whether another actor stands in the line from a place to an actor's chest."""
+    chest_m = np.swapaxes(bounds.chest_m, 0, 1)
+    sight_m = chest_m - places_m[:, None, None]
+    offset_m = np.swapaxes(bounds.axis_m, 0, 1)[None, :, None] - places_m[:, None, None, None, :2]
+    square_m2 = np.maximum((sight_m[..., :2] ** 2).sum(axis=-1), 1e-6)
+    along = np.clip(np.einsum("nfabi,nfai->nfab", offset_m, sight_m[..., :2]) / square_m2[..., None], 0.0, 1.0)
+    beside_m = np.linalg.norm(offset_m - along[..., None] * sight_m[..., None, :2], axis=-1)
+    height_m = places_m[:, None, None, None, 2] + along * sight_m[..., None, 2]
+    between = (beside_m < SHADOW_M) & (along > 0.0) & (along < 1.0) & (height_m < bounds.top_m.T[:, None])
+    between &= ~np.eye(len(bounds.top_m), dtype=bool)
+    return np.asarray(between.any(axis=-1))
 
 
 def _size_cost(
