@@ -26,7 +26,9 @@ _BODY_VERTICES = 13380
 # The mouth's inside, by its place among the skin's texture coordinates; it is never seen.
 _MOUTH_UV = (0.74, 0.14)
 _LASHES = tuple(f"helper-{side}-eyelashes-{row}" for side in ("l", "r") for row in (1, 2))
-_LASH_SHARE, _LASH_COLOUR = 0.45, (0.012, 0.009, 0.008)
+# How much of the sheets' length is left, for men and women.
+_LASH_SHARE = {False: 0.22, True: 0.42}
+_LASH_COLOUR = (0.012, 0.009, 0.008)
 
 
 @dataclass(frozen=True)
@@ -101,17 +103,21 @@ def _flesh(wearer: Wearer, person: Person, dressed: Dressed, rng: np.random.Gene
     stiff = np.unique(np.concatenate([part.faces.ravel() for part in parts[1:]]))
     weights[stiff] = 0.0
     weights[stiff, joint_index("head")] = 1.0
-    return Piece(_with_short_lashes(wearer.vertices_m, np.unique(lashes)), weights, tuple(parts))
+    return Piece(
+        _with_short_lashes(wearer.vertices_m, np.unique(lashes), _LASH_SHARE[person.traits.female]),
+        weights,
+        tuple(parts),
+    )
 
 
 def _with_short_lashes(
-    vertices_m: Float64[np.ndarray, "P 3"], lashes: Int32[np.ndarray, " L"]
+    vertices_m: Float64[np.ndarray, "P 3"], lashes: Int32[np.ndarray, " L"], share: float
 ) -> Float64[np.ndarray, "P 3"]:
     """The body with eyelashes of a natural length: MakeHuman's are sheets for pictures of lashes."""
     skin_m = vertices_m[:_BODY_VERTICES]
     _, root = cKDTree(skin_m).query(vertices_m[lashes])
     shortened = vertices_m.copy()
-    shortened[lashes] = skin_m[root] + _LASH_SHARE * (vertices_m[lashes] - skin_m[root])
+    shortened[lashes] = skin_m[root] + share * (vertices_m[lashes] - skin_m[root])
     return shortened
 
 

@@ -100,6 +100,8 @@ _WOMEN_WEAR = ("jeans", "slim trousers", "skirt", "jeans", "loose trousers", "sk
 _SHOES = ("trainers", "runners", "leather shoes")
 # How far socks reach above the floor under trousers, and with bare legs.
 _LONG_SOCK_M, _SHORT_SOCK_M = 0.20, 0.125
+# Socks lie on the skin: they hide it but for a rim this much narrower than that of other clothes.
+_SOCK_GRIP_M = 0.020
 _SOCK_DYES = ("white", "grey", "charcoal", "navy", "white")
 
 
@@ -212,19 +214,20 @@ def dress(wearer: Wearer, outfit: Outfit, seed: StageSeed) -> Dressed:
     template_m, weights = base_mesh().vertices_m, base_weights()
     shoes, footing = make_shoes(wearer, outfit.shoes, rng)
     pieces = [sew_top(wearer, outfit.top, top_fabric, rng, outfit.jacket)]
-    hidden = covered_by(top_field_m(outfit.top, template_m, weights))
+    fields_m = [top_field_m(outfit.top, template_m, weights)]
     if isinstance(outfit.bottom, SkirtPattern):
         pieces.append(sew_skirt(wearer, outfit.bottom, outfit.top, bottom_fabric, rng))
-        hidden |= covered_by(skirt_field_m(outfit.bottom, template_m, weights))
+        fields_m.append(skirt_field_m(outfit.bottom, template_m, weights))
     else:
         pieces.append(sew_trousers(wearer, outfit.bottom, outfit.top, bottom_fabric, rng))
-        hidden |= covered_by(trouser_field_m(outfit.bottom, template_m, weights))
+        fields_m.append(trouser_field_m(outfit.bottom, template_m, weights))
     if outfit.jacket is not None:
         pieces.append(sew_top(wearer, outfit.jacket, _woven(outfit.jacket_cloth, rng), rng))
-        hidden |= covered_by(top_field_m(outfit.jacket, template_m, weights))
+        fields_m.append(top_field_m(outfit.jacket, template_m, weights))
     if outfit.sock_m > 0.0:
         pieces.append(make_socks(wearer, outfit.sock_m, _woven(outfit.sock_cloth, rng)))
-        hidden |= sock_field_m(outfit.sock_m, template_m) > 0.01
+        fields_m.append(sock_field_m(outfit.sock_m, template_m) + _SOCK_GRIP_M)
+    hidden = covered_by(tuple(fields_m))
     hidden |= shoe_field_m(outfit.shoes, template_m) > 0.02
     return Dressed((*pieces, shoes), hidden, footing)
 

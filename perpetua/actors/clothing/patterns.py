@@ -119,6 +119,11 @@ def skirt_field_m(
     return np.where(arm_share(weights) > 0.3, -_FAR_M, inside)
 
 
-def covered_by(field_m: Float64[np.ndarray, " P"]) -> Bool[np.ndarray, " P"]:
-    """Vertices that a garment hides for good."""
-    return np.asarray(field_m > COVERED_MARGIN_M)
+def covered_by(fields_m: tuple[Float64[np.ndarray, " P"], ...]) -> Bool[np.ndarray, " P"]:
+    """Vertices that garments hide for good: well inside one of them, or inside two at once.
+
+    Args:
+        fields_m: metres inside each garment's cut lines.
+    """
+    inside = np.stack(fields_m)
+    return np.asarray(np.any(inside > COVERED_MARGIN_M, axis=0) | (np.sum(inside > 0.0, axis=0) > 1))

@@ -103,7 +103,7 @@ def sew_top(
     seamed, _ = split(cut, front_m(cut.template_m))
     field_m = _edged(seamed, top_field_m(pattern, seamed.template_m, seamed.weights))
     ease_m = _top_ease_m(pattern, seamed)
-    gap_m = 0.30 * pattern.ease_m + 0.002 + 0.006 * np.clip((0.10 - seamed.template_m[:, 2]) / 0.1, 0.0, 1.0)
+    gap_m = 0.30 * pattern.ease_m + 0.002 + 0.007 * np.clip((0.16 - seamed.template_m[:, 2]) / 0.08, 0.0, 1.0)
     edge = np.clip(field_m / 0.03, 0.0, 1.0)
     arm = arm_share(seamed.weights)
     long_sleeves = pattern.sleeve_m > _SHORT_SLEEVE_M
@@ -157,7 +157,9 @@ def sew_trousers(
     hold = np.maximum(np.interp(below, [-0.02, 0.02], [0.25, 0.0]), 0.2 * np.clip(1.0 - field_m / 0.03, 0.0, 1.0))
     edge = np.clip(field_m / 0.03, 0.0, 1.0)
     fold_m = pattern.fold_m * (0.35 + 0.65 * edge) * trouser_folds(seamed.template_m, rng)
-    cloth_m = draped(seamed, ease_m, Drape(np.full(len(ease_m), 0.4 * hip), hold, fold_m))
+    snug = _tucked_in(top, seamed)
+    gap_m = 0.4 * hip * snug
+    cloth_m = draped(seamed, snug * ease_m, Drape(gap_m, np.maximum(hold, 0.5 * (1.0 - snug)), snug * fold_m))
     folded = replace(seamed, vertices_m=cloth_m)
     weights = _onto(_eased_weights(seamed, 6), {"foot": ("ankle", 1.0), "ankle": ("knee", 0.75)})
     sewn = hemmed(replace(folded, weights=weights), field_m, _HEM_M, pattern.thickness_m)
@@ -169,6 +171,12 @@ def sew_trousers(
         outside, back_pockets_m(outside.template_m), 0.002, "pockets", _material("trousers", fabric), fabric.tile_m
     )
     return joined((legs, pockets))
+
+
+def _tucked_in(top: TopPattern, surface: Surface) -> Float64[np.ndarray, " P"]:
+    """Share of its room that a garment keeps where a top goes over it, which must have space: less from the hem up."""
+    inside_m = top_field_m(top, surface.template_m, surface.weights)
+    return np.interp(inside_m, [-0.035, 0.0, _TUCKED_M], [1.0, 0.35, 0.15])
 
 
 def _hidden_by(top: TopPattern, sewn: Surface) -> Bool[np.ndarray, " F"]:
@@ -192,8 +200,9 @@ def sew_skirt(
     cut, _ = positive(helper, skirt_field_m(pattern, helper.template_m, helper.weights))
     field_m = _edged(cut, skirt_field_m(pattern, cut.template_m, cut.weights))
     outward = smooth_normals(cut)
-    eased_m = _fitted(wearer, cut) + pattern.hip_ease_m * outward
-    height_m = 0.013 * skirt_folds(cut.template_m, pattern.hem_z_m, rng)
+    snug = _tucked_in(top, cut)
+    eased_m = _fitted(wearer, cut) + (snug * pattern.hip_ease_m)[:, None] * outward
+    height_m = 0.013 * snug * skirt_folds(cut.template_m, pattern.hem_z_m, rng)
     folded = replace(cut, vertices_m=eased_m + height_m[:, None] * outward)
     sewn = hemmed(replace(folded, weights=_skirt_weights(cut)), field_m, _HEM_M, pattern.thickness_m)
     middle = np.array([0.02, 0.0, 0.1])
