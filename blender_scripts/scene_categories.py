@@ -70,7 +70,7 @@ _PHRASES: dict[str, str] = {
         "basket": "basket, hamper",
         "bin": "bin, trash can, wastebasket",
         "kitchen_counter": "counter, countertop, worktop, kitchen counter",
-        "kitchen_cabinet": "kitchen cabinet, kitchen cupboard",
+        "kitchen_cabinet": "kitchen cabinet, kitchen cabinet door, kitchen cupboard",
         "kitchen_island": "kitchen island",
         "oven": "oven, oven door, stove, cooker, hob",
         "microwave": "microwave",
