@@ -27,8 +27,8 @@ def local_rotations(rotation: Float64[np.ndarray, "T 22 3 3"]) -> Float64[np.nda
     return local
 
 
-def write_amass(path: Path, motion: BodyMotion, up: str = "z", old: bool = False) -> None:
-    """An AMASS file: Z up as AMASS has it or Y up as BEDLAM2 has it; ``old`` takes the first generation's keys."""
+def write_amass(path: Path, motion: BodyMotion, up: str = "z", keys: str = "smplx") -> None:
+    """A file as AMASS has it (``keys`` "smplx", or "smplh" of the first generation), or BEDLAM2 ("poses")."""
     rotation = y_up_rotations(motion)
     pelvis_m = motion.pelvis_m @ Y_UP_FROM_OURS.T
     if up == "z":
@@ -37,9 +37,12 @@ def write_amass(path: Path, motion: BodyMotion, up: str = "z", old: bool = False
     pose = Rotation.from_matrix(local_rotations(rotation).reshape(-1, 3, 3)).as_rotvec().reshape(-1, 66)
     hands = np.tile(np.linspace(0.0, 0.3, 90), (len(pose), 1))
     trans = pelvis_m - np.array([0.003, -0.351, 0.012])
-    if old:
+    if keys == "smplh":
         poses = np.concatenate([pose, hands], axis=1)
         np.savez(path, poses=poses, trans=trans, mocap_framerate=motion.fps, gender="male", betas=np.zeros(16))
+    elif keys == "poses":
+        poses = np.concatenate([pose, np.full((len(pose), 9), 0.1), hands], axis=1)
+        np.savez(path, poses=poses, trans=trans, mocap_frame_rate=motion.fps, gender="neutral", betas=np.zeros(300))
     else:
         np.savez(
             path,

@@ -66,11 +66,11 @@ def _check_locked(motion: BodyMotion, joint_rps: float = 16.0) -> None:
     assert np.deg2rad(turn_deg.max()) * motion.fps < joint_rps
 
 
-@pytest.mark.parametrize(("up", "old"), [("z", False), ("y", False), ("z", True), ("y", True)])
-def test_an_amass_file_holds_what_was_written(tmp_path: Path, up: str, old: bool) -> None:
+@pytest.mark.parametrize(("up", "keys"), [("z", "smplx"), ("y", "smplx"), ("z", "smplh"), ("y", "poses")])
+def test_an_amass_file_holds_what_was_written(tmp_path: Path, up: str, keys: str) -> None:
     # One hand up: a mirrored body would show.
     _, motion = _walk("curve", 3.0, "walks while waving the right hand")
-    write_amass(tmp_path / "clip.npz", motion, up, old)
+    write_amass(tmp_path / "clip.npz", motion, up, keys)
     clip = read_amass(tmp_path / "clip.npz")
     assert clip.fps == FPS
     assert np.abs(clip.world_from_joint - motion.world_from_joint).max() < 1e-6
@@ -176,6 +176,18 @@ def test_words_choose_the_clip(tmp_path: Path, wanted: str, found: str) -> None:
     assert len(drawn) == 3, "without a matching word the seed decides"
 
 
+@pytest.mark.parametrize("kind", ["slow", "brisk"])
+def test_of_clips_that_fit_alike_the_one_of_the_route_s_pace_is_played(tmp_path: Path, kind: str) -> None:
+    both, only = tmp_path / "both", tmp_path / "only"
+    for folder, kinds in ((both, ("slow", "brisk")), (only, (kind,))):
+        folder.mkdir()
+        for name in kinds:
+            write_amass(folder / f"walk_{name}.npz", _walk(name, 4.0)[1])
+    route = sample_route(kind, FPS, 3.0)
+    for seed in range(2):
+        assert _make(route, both, seed).pelvis_m.tobytes() == _make(route, only, seed).pelvis_m.tobytes()
+
+
 def test_words_are_compared_by_their_stems() -> None:
     assert action_words("WalkingSlowly_01") == {"walk", "slow"}
     assert action_words("a person waves with her hand") == {"wav", "hand"}
@@ -236,6 +248,7 @@ def _arrays() -> dict[str, np.ndarray]:
     ("changes", "rule"),
     [
         ({"trans": np.full((20, 3), np.nan)}, "not finite"),
+        ({"poses": np.zeros((0, 156))}, "0 frames"),
         ({"pose_body": np.full((20, 63), np.inf)}, "not finite"),
         ({"trans": np.zeros((19, 3))}, "19 rows of trans"),
         ({"trans": np.zeros((20, 4))}, r"\(T, 3\) is needed"),
@@ -293,6 +306,7 @@ def test_a_file_that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch:
         ("Zrotation", "Wrotation", "channels among"),
         ("Frame Time: 0.03", "Frame Time: -0.03", "frame time"),
         ("Frames: 60", "Frames: 61", "numbers, not"),
+        ("Frames: 60", "Frames: 0", "0 frames"),
         ("End Site", "Ende", "JOINT, End Site"),
         (mixamo_name("left_knee"), "Knie", "lacks the joints.*leftleg"),
     ],

@@ -55,12 +55,11 @@ class ClipMotion:
         from_start = config.clips.from_start
         clock = make_clock(len(route.heading_rad), fps, 0.0 if from_start else MARGIN_S)
         going = going_along(RoutePath(route, fps), clock)
-        rng = seed.stream("clips", route.actor)
-        chosen = _choose(route, going, skeleton, config.clips, rng)
+        chosen = _choose(route, going, skeleton, config.clips, seed.stream("clips", route.actor))
         part = chosen.walking if chosen.walking is not None else chosen.standing
         if part is None:
             raise AssetError(_nothing_fits(config.clips, "stands or walks"))
-        share = 0.0 if from_start else float(rng.uniform())
+        share = 0.0 if from_start else float(seed.stream("clip start", route.actor).uniform())
         tape = stretched(part, rows_needed(going, part, clock), skeleton, share)
         ride = ride_along(tape, going, clock)
         standing = neutral_pose(tape) if chosen.standing is None else chosen.standing
@@ -82,32 +81,34 @@ def clip_listing(config: MotionConfig) -> list[str]:
 
 
 def _choose(route: Route, going: Going, skeleton: Skeleton, config: ClipsConfig, rng: np.random.Generator) -> _Chosen:
+    """The first group of clips that fit equally well and hold what is needed decides, in it the nearest pace."""
     goes = going.speed_mps[going.speed_mps > _GOING_MPS]
     wanted_mps = float(np.median(goes)) if len(goes) > 0 else None
     walking: Tape | None = None
     standing: Tape | None = None
-    tried = 0
+    nearest, left = np.inf, _MOST_TRIED
     for group in ranked_clips(clip_files(clip_folder(config)), route.description, rng):
-        tapes = [make_tape(load_clip(path, config.up), skeleton) for path in group[: _MOST_TRIED - tried]]
-        tried += len(tapes)
-        walking = _nearest_pace(tapes, wanted_mps) if walking is None else walking
-        standing = next(filter(None, map(standing_part, tapes)), None) if standing is None else standing
-        if (walking is not None or (wanted_mps is None and standing is not None)) or tried >= _MOST_TRIED:
+        for path in group[:left]:
+            left -= 1
+            tape = make_tape(load_clip(path, config.up), skeleton)
+            standing = standing_part(tape) if standing is None else standing
+            walk = walking_part(tape)
+            apart = _pace_apart(walk, wanted_mps)
+            walking, nearest = (walk, apart) if apart < nearest else (walking, nearest)
+            if nearest < _SAME_PACE:
+                return _Chosen(walking, standing)
+        if walking is not None or left == 0 or (wanted_mps is None and standing is not None):
             break
     if wanted_mps is not None and walking is None:
         raise AssetError(_nothing_fits(config, "walks for a second, and the route of an actor does"))
     return _Chosen(walking, standing)
 
 
-def _nearest_pace(tapes: list[Tape], wanted_mps: float | None) -> Tape | None:
-    """The first that walks about as fast as wanted, else the one that does so most nearly; None if none walks."""
-    walks = [walk for walk in map(walking_part, tapes) if walk is not None]
-    if wanted_mps is None or not walks:
-        return walks[0] if walks else None
-    apart = [abs(float(np.log(np.median(walk.speed_mps) / wanted_mps))) for walk in walks]
-    return next(
-        (walk for walk, ratio in zip(walks, apart, strict=True) if ratio < _SAME_PACE), walks[int(np.argmin(apart))]
-    )
+def _pace_apart(walk: Tape | None, wanted_mps: float | None) -> float:
+    """Natural logarithm of the ratio of paces; infinite for what does not walk."""
+    if walk is None:
+        return float("inf")
+    return 0.0 if wanted_mps is None else abs(float(np.log(np.median(walk.speed_mps) / wanted_mps)))
 
 
 def _nothing_fits(config: ClipsConfig, what: str) -> str:

@@ -12,7 +12,7 @@ from jaxtyping import Float64
 from scipy.spatial.transform import Rotation
 
 from perpetua.actors.motion.recorded.archive import read_arrays
-from perpetua.actors.motion.recorded.clip import OURS_FROM_Y_UP, Clip, check_clip, is_y_up
+from perpetua.actors.motion.recorded.clip import OURS_FROM_Y_UP, Clip, check_clip, check_frames, is_y_up
 from perpetua.actors.types import BODY_PARENTS
 from perpetua.errors import AssetError
 
@@ -35,6 +35,7 @@ def read_amass(path: Path, up: str = "auto") -> Clip:
     """
     arrays = read_arrays(path, ("trans", "root_orient", "pose_body", "pose_hand", "poses", *_RATE_KEYS))
     body, hands = _poses(arrays, path)
+    check_frames(path.name, len(body))
     trans = _rows(arrays, "trans", path, 3)
     if len(trans) != len(body):
         raise AssetError(f"'{path}' has {len(trans)} rows of trans and {len(body)} of poses; they must be as many")

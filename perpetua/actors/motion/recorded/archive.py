@@ -9,7 +9,7 @@ import numpy as np
 
 from perpetua.errors import AssetError
 
-MOST_BYTES = 512 * 2**20
+MOST_BYTES = 256 * 2**20
 
 
 def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
@@ -20,7 +20,7 @@ def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         names: arrays to read; others are not touched.
 
     Raises:
-        AssetError: not an .npz file; an array is damaged, holds Python objects, or is larger than 512 MiB.
+        AssetError: not an .npz file; an array is damaged, holds Python objects, or is larger than 256 MiB.
     """
     try:
         with zipfile.ZipFile(path) as archive:

@@ -10,9 +10,10 @@ import numpy as np
 from jaxtyping import Float64
 from scipy.spatial.transform import Rotation
 
+from perpetua.actors.motion.recorded.clip import check_frames
 from perpetua.errors import AssetError
 
-_MOST_BYTES = 256 * 2**20
+_MOST_BYTES = 64 * 2**20
 _MOST_JOINTS = 1000
 _CHANNELS = ("xposition", "yposition", "zposition", "xrotation", "yrotation", "zrotation")
 
@@ -154,6 +155,7 @@ def _read_frames(tail: str, width: int, path: Path) -> tuple[Float64[np.ndarray,
         if words[0] != "Frames:" or words[2:4] != ["Frame", "Time:"]:
             raise ValueError("MOTION must begin with 'Frames: N' and 'Frame Time: S'")
         frames, frame_s = int(words[1]), float(words[4])
+        check_frames(path.name, frames)
         if not (frame_s > 0.0 and np.isfinite(frame_s)):
             raise ValueError(f"a frame time of {frame_s} s")
         if len(words) - 5 != frames * width:

@@ -13,7 +13,7 @@ from perpetua.errors import AssetError
 # Body models, BVH files and Kimodo are Y up and face +Z at rest; we are Z up and face +X: (x, y, z) -> (z, x, y).
 OURS_FROM_Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 FEWEST_FRAMES = 8
-MOST_FRAMES = 200_000
+MOST_FRAMES = 100_000
 
 
 @dataclass(frozen=True)
@@ -39,15 +39,20 @@ class Clip:
         return (len(self.pelvis) - 1) / self.fps
 
 
+def check_frames(name: str, frames: int) -> None:
+    """Raises AssetError where a recording is too short or too long to be used."""
+    if not FEWEST_FRAMES <= frames <= MOST_FRAMES:
+        raise AssetError(f"'{name}' has {frames} frames; {FEWEST_FRAMES} to {MOST_FRAMES} can be used")
+
+
 def check_clip(clip: Clip) -> Clip:
     """The clip itself.
 
     Raises:
-        AssetError: too few or too many frames, no usable frame rate, a number that is not finite, a pelvis that jumps.
+        AssetError: too few or too many frames, no usable frame rate, a number that is not finite.
     """
     frames = len(clip.pelvis)
-    if not FEWEST_FRAMES <= frames <= MOST_FRAMES:
-        raise AssetError(f"'{clip.name}' has {frames} frames; {FEWEST_FRAMES} to {MOST_FRAMES} can be used")
+    check_frames(clip.name, frames)
     if not (np.isfinite(clip.fps) and 1.0 <= clip.fps <= 1000.0):
         raise AssetError(f"'{clip.name}' has {clip.fps:g} frames per second; 1 to 1000 can be used")
     for name, values in (("rotations", clip.world_from_joint), ("root positions", clip.pelvis)):

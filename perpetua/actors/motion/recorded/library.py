@@ -109,6 +109,6 @@ def load_clip(path: Path, up: str) -> Clip:
     return _load_once(path, stat.st_mtime_ns, stat.st_size, up)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=4)
 def _load_once(path: Path, mtime_ns: int, size: int, up: str) -> Clip:
     return _READERS[path.suffix.lower()](path, up)
