@@ -317,8 +317,8 @@ STAGES = (
         _routes,
         redraw=_every_time,
     ),
-    Stage(40, "motion", 2, ("room", "routes"), _motion_settings, _motion),
-    Stage(50, "actors", 2, ("room", "routes", "motion"), _settings("actors", _FPS), _actors),
+    Stage(40, "motion", 3, ("room", "routes"), _motion_settings, _motion),
+    Stage(50, "actors", 3, ("room", "routes", "motion"), _settings("actors", _FPS), _actors),
     Stage(
         60,
         "cameras",

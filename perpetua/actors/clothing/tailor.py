@@ -38,8 +38,11 @@ _TUCKED_M = 0.025
 
 _BUTTON = Material("button", (0.6, 0.58, 0.52), roughness=0.35, image=np.full((8, 8, 3), (205, 200, 190), np.uint8))
 
-# Cuffs do not turn with the hand, and a hem hangs from the waist more than it follows the thighs.
-_TOP_MOVES = {"wrist": ("forearm", 0.9), "hip": ("pelvis", 0.5)}
+# Cuffs do not turn with the hand, and a hem hangs from the waist a little more than what it covers; one at the waist
+# does not follow the thighs at all.
+_CUFF_MOVE = ("forearm", 0.9)
+_HEM_MOVES = {True: ("pelvis", 1.0), False: ("pelvis", 0.12)}
+_AT_WAIST_Z_M = 0.05
 
 
 def _material(name: str, fabric: Fabric) -> Material:
@@ -109,7 +112,8 @@ def sew_top(
     long_sleeves = pattern.sleeve_m > _SHORT_SLEEVE_M
     fold_m = pattern.fold_m * (0.35 + 0.65 * edge) * top_folds(seamed.template_m, arm, long_sleeves, rng)
     cloth_m = draped(seamed, ease_m, Drape(gap_m, _top_hold(pattern, seamed, field_m), fold_m))
-    outside = replace(seamed, vertices_m=cloth_m, weights=_onto(_eased_weights(seamed, 6), _TOP_MOVES))
+    moves = {"wrist": _CUFF_MOVE, "hip": _HEM_MOVES[pattern.hem_z_m > _AT_WAIST_Z_M]}
+    outside = replace(seamed, vertices_m=cloth_m, weights=_onto(_eased_weights(seamed, 6), moves))
     sewn = hemmed(outside, field_m, _HEM_M, pattern.thickness_m)
     on_arm = arm_share(_template_weights(sewn, seamed))[sewn.faces].mean(axis=1) > 0.5
     uv = trunk(sewn)
