@@ -34,6 +34,7 @@ from perpetua.actors.motion.sitting import (
     without_failed_sits,
 )
 from perpetua.actors.motion.source import MOTION_SOURCES
+from perpetua.actors.motion.steering import low_obstacles, steered
 from perpetua.actors.motion.style import GaitStyle, draw_gait_style
 from perpetua.actors.motion.trunk import Poise, Trunk, make_trunk, spine_between
 from perpetua.actors.types import BODY_JOINTS, BodyMotion, Route, Skeleton
@@ -140,15 +141,11 @@ def _stride(walker: _Walker, rng: np.random.Generator, clock: _Clock) -> _Stride
     ground = Ground(walker.room)
     planner = FootstepPlanner(walker.path, walker.style, hip_height_m, ankle_ahead_m, ground, rng)
     plants = planner.plan()
-    tracks = [
-        raised_heels(
-            foot_track(steps, foot, walker.style.clearance_m, ground, clock.time_s),
-            walker.sittings,
-            foot.toe_joint_m,
-            clock.time_s,
-        )
-        for steps, foot in zip(plants, (left, right), strict=True)
-    ]
+    obstacles = low_obstacles(walker.room, walker.path.position_m(clock.time_s))
+    tracks = []
+    for steps, foot in zip(plants, (left, right), strict=True):
+        track = steered(foot_track(steps, foot, walker.style.clearance_m, ground, clock.time_s), foot, obstacles)
+        tracks.append(raised_heels(track, walker.sittings, foot.toe_joint_m, clock.time_s))
     return _Stride(plants, (tracks[0], tracks[1]))
 
 
