@@ -16,7 +16,10 @@ from perpetua.optimisation import deterministic_torch, minimise
 
 DEGREE = 3
 CONTROL_S = 0.6
+# Of sequences of this length and longer. The shorter a sequence, the faster a control point's error makes a camera.
 LEARNING_RATE_M = 0.12
+LEARNING_RATE_S = 5.0
+LEAST_LEARNING_RATE_M = 0.02
 MARGIN = 0.15
 COVERED_POINTS = 2
 LINE_SAMPLES = 16
@@ -67,7 +70,8 @@ def optimise_paths(problem: Problem, config: CamerasConfig) -> Solution:
     The path of a view whose wished speed is 0 is a single point.
     """
     times = problem.start_m.shape[2]
-    basis = spline_basis(np.linspace(0.0, 1.0, times), problem.step_s * (times - 1))
+    duration_s = problem.step_s * (times - 1)
+    basis = spline_basis(np.linspace(0.0, 1.0, times), duration_s)
     position = torch.tensor(_controls_along(problem.start_m, basis.shape[1]), dtype=torch.float32, requires_grad=True)
     offset = torch.zeros_like(position, requires_grad=True)
     terms = _Terms(problem, config, basis)
@@ -76,7 +80,7 @@ def optimise_paths(problem: Problem, config: CamerasConfig) -> Solution:
             [position, offset],
             lambda: {name: value.sum() for name, value in terms(position, offset).items()},
             config.steps,
-            LEARNING_RATE_M,
+            max(LEAST_LEARNING_RATE_M, LEARNING_RATE_M * min(1.0, duration_s / LEARNING_RATE_S)),
         )
     with torch.no_grad(), deterministic_torch():
         final = {name: value.double().numpy() for name, value in terms(position, offset).items()}
