@@ -27,9 +27,9 @@ FPS = 24.0
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The stand-in for Kimodo, whose people are taller than ours and wave their right hand when told."""
+    """The stand-in for Kimodo, whose people are taller than ours and hold a phone when told."""
     skeleton, strides = sample_skeleton(1.8), {}
-    for word, description in {"walk": "walks", "wav": "walks while waving the right hand"}.items():
+    for word, description in {"walk": "walks", "phone": "walks while talking on the phone"}.items():
         route = replace(sample_route("brisk", 30.0, 8.0), description=description)
         strides[word] = MOTION_SOURCES["procedural"]().make(
             route, skeleton, empty_room(), 30.0, MotionConfig(), StageSeed(5, 0, "kimodo")
@@ -100,7 +100,7 @@ def test_sentences_share_the_time_and_none_lasts_longer_than_ten_seconds() -> No
 
 @pytest.mark.parametrize("model", ["Kimodo-SOMA-RP-v1", "Kimodo-SMPLX-RP-v1"])
 def test_the_answer_is_laid_on_the_route_with_planted_feet(program: Path, model: str) -> None:
-    route = _route(description="walks while waving the right hand")
+    route = _route(description="walks while talking on the phone")
     motion = _make(program, route, model=model)
     assert motion.world_from_joint.shape == (len(route.heading_rad), 22, 3, 3)
     away_m = np.linalg.norm(motion.pelvis_m[:, :2] - route.position_m[:, :2], axis=1)
@@ -114,7 +114,7 @@ def test_the_answer_is_laid_on_the_route_with_planted_feet(program: Path, model:
     assert np.linalg.norm(np.diff(contact_m, axis=0), axis=2)[both].max() < 1e-3
     joint_m = joint_positions(motion, SKELETON)
     left_m, right_m = (joint_m[:, joint_index(f"{side}_wrist"), 2].max() for side in ("left", "right"))
-    assert right_m > 1.2 > left_m, "it is the right hand that is up"
+    assert right_m > 1.2 > left_m, "it is the right hand that holds the phone"
 
 
 def test_a_long_route_is_made_of_several_prompts_in_one_call(program: Path) -> None:
