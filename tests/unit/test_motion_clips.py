@@ -20,10 +20,13 @@ from perpetua.actors.config import ClipsConfig, MotionConfig
 from perpetua.actors.motion import MOTION_SOURCES
 from perpetua.actors.motion.clips import clip_listing
 from perpetua.actors.motion.kinematics import contact_positions
+from perpetua.actors.motion.legs import foot_of
 from perpetua.actors.motion.recorded import archive
 from perpetua.actors.motion.recorded.amass import read_amass
 from perpetua.actors.motion.recorded.bvh import read_bvh_clip
 from perpetua.actors.motion.recorded.library import action_words, clip_files, ranked_clips
+from perpetua.actors.motion.recorded.planting import WantedFoot, plant_foot
+from perpetua.actors.motion.rotations import about_y, about_z
 from perpetua.actors.types import BODY_JOINTS, BodyMotion, Route
 from perpetua.errors import AssetError
 from perpetua.seeding import StageSeed
@@ -163,6 +166,22 @@ def test_a_pause_puts_the_feet_beside_each_other_and_keeps_them_there(tmp_path: 
     assert abs(ankle_m[0, 0] - ankle_m[1, 0]) < 0.15 and 0.1 < ankle_m[0, 1] - ankle_m[1, 1] < 0.4
     turn_deg = _apart_deg(walked.world_from_joint[-4:-1], walked.world_from_joint[-3:])
     assert turn_deg.max() < 1.5
+
+
+def test_a_running_foot_beyond_the_vertical_keeps_its_yaw_and_stands_still() -> None:
+    share = np.clip((np.arange(90.0) - 20.0) / 50.0, 0.0, 1.0)
+    pitch_rad = 2.0 * np.sin(np.pi * share) ** 2
+    rotation = about_z(np.full(90, 0.4)) @ about_y(pitch_rad)
+    ankle_m = np.column_stack([2.0 * share, np.zeros(90), 0.08 + 0.3 * np.sin(np.pi * share) ** 2])
+    stands = (share == 0.0) | (share == 1.0)
+    shape = foot_of(SKELETON, "left")
+    track = plant_foot(WantedFoot(ankle_m, rotation, rotation, stands, np.ones(90)), shape, np.full(90, 0.25))
+    assert np.allclose(track.yaw_rad, 0.4) and track.pitch_rad.max() > 1.95
+    for contact, where in ((track.heel_contact, stands), (track.toe_contact, stands)):
+        assert np.array_equal(contact, where)
+    assert np.ptp(track.ankle_m[:20], axis=0).max() < 1e-9
+    assert np.allclose(track.ankle_m[stands, 2], 0.25 + shape.ankle_height_m)
+    assert np.abs(np.diff(track.ankle_m, axis=0)).max() < 0.08
 
 
 @pytest.mark.parametrize(("wanted", "found"), [("talks on the phone", "walk_phone.npz"), ("dances", "b2.npz")])

@@ -115,6 +115,16 @@ def test_words_set_the_pace_and_ask_for_a_seat() -> None:
     assert np.linalg.norm(np.diff(sits.position_m[there], axis=0), axis=1).max() * 20.0 < 1e-6
 
 
+def test_who_stands_does_not_drift() -> None:
+    motion = MotionConfig(descriptions=("stands and looks around", "walks"))
+    routes = plan_routes(
+        ROOM, GRID, ActorsConfig(count=2, routes=RoutesConfig(steps=100), motion=motion), 200, 20.0, SEED
+    )
+    (stands,) = [route for route in routes if route.description == motion.descriptions[0]]
+    assert np.ptp(stands.position_m, axis=0).max() < 1e-3
+    assert stands.dwells
+
+
 def test_pauses_look_at_what_they_are_about() -> None:
     config = ActorsConfig(count=2, routes=RoutesConfig(steps=100, pause_share=0.6))
     routes = plan_routes(ROOM, GRID, config, 240, 20.0, SEED)
@@ -158,8 +168,9 @@ def test_short_and_slow_sequences(frames: int, fps: float) -> None:
 
 
 def test_too_many_actors_get_a_clear_error() -> None:
-    config = ActorsConfig(count=9, routes=RoutesConfig(separation_m=2.5, steps=10, max_redraws=0))
-    with pytest.raises(RouteError, match=r"route of actor \d+ .* is required: lower actors.count or choose a larger"):
+    crowded = RoutesConfig(separation_m=2.5, steps=10, learning_rate=1e-4, max_redraws=1)
+    config = ActorsConfig(count=6, routes=crowded)
+    with pytest.raises(RouteError, match=r"route of actor \d+ comes .* is required: lower actors.count or choose"):
         plan_routes(ROOM, GRID, config, 12, 12.0, SEED)
 
 
