@@ -69,7 +69,11 @@ class RoutesConfig(Section):
 class ClipsConfig(Section):
     """Recorded motion from a folder of .npz (AMASS, SMPL-X, BEDLAM2) and .bvh files."""
 
-    folder: str = Field("", description="folder of clips; empty for motion/clips in the asset folder")
+    folder: str = Field(
+        "",
+        description="folder of clips, matched by file names and by its index.yaml (file name: description); "
+        "empty for motion/clips in the asset folder",
+    )
     up: Literal["auto", "y", "z"] = Field("auto", description="axis along which recorded bodies stand: auto, y or z")
     from_start: bool = Field(False, description="play clips from their first frame, not from one drawn by the seed")
 
