@@ -311,7 +311,7 @@ STAGES = (
     Stage(
         30,
         "routes",
-        2,
+        3,
         ("room", "navigation"),
         _route_settings,
         _routes,

@@ -168,7 +168,7 @@ def test_short_and_slow_sequences(frames: int, fps: float) -> None:
 
 
 def test_too_many_actors_get_a_clear_error() -> None:
-    crowded = RoutesConfig(separation_m=2.5, steps=10, learning_rate=1e-4, max_redraws=1)
+    crowded = RoutesConfig(separation_m=2.5, steps=10, learning_rate=1e-4, max_redraws=0)
     config = ActorsConfig(count=6, routes=crowded)
     with pytest.raises(RouteError, match=r"route of actor \d+ comes .* is required: lower actors.count or choose"):
         plan_routes(ROOM, GRID, config, 12, 12.0, SEED)

@@ -21,6 +21,7 @@ STARTS = 48
 # Someone who is about to sit down stands so far before the middle of the seat, on free floor within a tolerance.
 BEFORE_SEAT_M = 0.45
 SEAT_TOLERANCE_M = 0.25
+BETWEEN_SITTERS_M = 1.0
 # Of the paces of a role without stated paces, neighbours are gone at for this share of the legs.
 CHANGE_SHARE = 0.3
 # Someone who walks and stands pauses so much more.
@@ -80,8 +81,12 @@ def _speed_mps(pace: str, config: RoutesConfig) -> float:
 
 def _manner(stage: Stage, role: Role, config: RoutesConfig, others: list[Walk]) -> Manner:
     """A role in figures: its paces and their neighbours, its pauses, and the seats that nobody else sits on."""
-    taken = {pause.spot.target_m for walk in others for pause in walk.pauses if pause.spot.purpose == "sit"}
-    seats = tuple(seat for seat in stage.seats if seat.target_m not in taken) if role.sits else ()
+    taken_m = [pause.spot.place_m for walk in others for pause in walk.pauses if pause.spot.purpose == "sit"]
+    seats = tuple(
+        seat
+        for seat in stage.seats
+        if role.sits and all(math.dist(seat.place_m, place_m) >= BETWEEN_SITTERS_M for place_m in taken_m)
+    )
     paces = [pace for pace in role.paces if pace != "stand"]
     if not paces and seats:
         paces = ["stroll"]

@@ -26,7 +26,9 @@ def explain(violation: Violation, room: Room, steps_per_frame: int) -> str:
     if violation.rule == "sidestep":
         return f"{who} walks {value:.2f} rad off its heading at frame {frame}; at most {limit:.2f} rad is allowed"
     unit = UNITS[violation.rule]
-    return f"{who} has a {violation.rule} of {value:.2f} {unit} at frame {frame}; at most {limit:.2f} {unit} is allowed"
+    article = "an" if violation.rule == "acceleration" else "a"
+    allowed = f"at most {limit:.2f} {unit} is allowed"
+    return f"{who} has {article} {violation.rule} of {value:.2f} {unit} at frame {frame}; {allowed}"
 
 
 def _nearest_object(room: Room, place_m: tuple[float, float]) -> str:

@@ -26,8 +26,8 @@ SPEED_SHARE = 0.92
 PACE_EXCESS = 1.15
 # A shift of a path is a sum of bells of this width over time, so that neighbours move together and stay smooth.
 BELL_S = 0.2
-# Around a pause the clock of the bells slows down within this time, and during it stands.
-SLOWING_S = 0.35
+# Who moves slower than this stands; around it the clock of the bells slows down within this time, then it stands too.
+STILL_MPS, SLOWING_S = 0.02, 0.35
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,12 @@ class OptimisedPaths:
 def optimise_paths(plan: PlannedPaths, grid: NavGrid, config: RoutesConfig) -> OptimisedPaths:
     """The paths near the walks of ``plan`` that minimise the weighted losses.
 
-    A path is shifted by a sum of Gaussian bells over its own clock, which stands while the actor pauses: whatever the
-    shift, a pause stays perfectly still. Headings turn by bells over plain time.
+    A path is shifted by a sum of Gaussian bells over its own clock, which stands while the actor stands: whatever the
+    shift, nobody drifts. Headings turn by bells over plain time.
     """
     walks = plan.walks
     start_m, start_rad = torch.from_numpy(walks.position_m), torch.from_numpy(walks.heading_rad)
-    shift_bells = torch.from_numpy(_bells(_own_clock(plan), walks.step_s))
+    shift_bells = torch.from_numpy(_bells(_own_clock(walks), walks.step_s))
     plain_clock = np.broadcast_to(np.arange(start_rad.shape[1], dtype=np.float64), start_rad.shape)
     turn_bells = torch.from_numpy(_bells(plain_clock, walks.step_s))
     shift = torch.zeros(len(start_m), shift_bells.shape[2], 2, dtype=torch.float64, requires_grad=True)
@@ -141,13 +141,15 @@ def signed_clearance_m(grid: NavGrid) -> Float64[np.ndarray, "X Y"]:
     return grid.clearance_m.astype(np.float64) - inside_m
 
 
-def _own_clock(plan: PlannedPaths) -> Float64[np.ndarray, "A T"]:
-    """Steps that each actor has spent otherwise than pausing; the clock slows down before a pause, smoothly."""
-    clock = np.empty(plan.pausing.shape)
-    for row, pausing in zip(clock, plan.pausing, strict=True):
-        away_s = ndimage.distance_transform_edt(~pausing) * plan.walks.step_s if pausing.any() else np.inf
-        share = np.clip((np.asarray(away_s) - plan.walks.step_s) / SLOWING_S, 0.0, 1.0)
-        rate = np.broadcast_to(share**2 * (3.0 - 2.0 * share), row.shape)
+def _own_clock(walks: TimedPaths) -> Float64[np.ndarray, "A T"]:
+    """Steps that each actor has spent otherwise than standing; the clock slows down before that, smoothly."""
+    clock = np.empty(walks.heading_rad.shape)
+    for row, position_m in zip(clock, walks.position_m, strict=True):
+        moves = np.linalg.norm(np.diff(position_m, axis=0), axis=1) > STILL_MPS * walks.step_s
+        stands = ~(np.append(False, moves) | np.append(moves, False))
+        away_s = ndimage.distance_transform_edt(~stands) * walks.step_s if stands.any() else np.full(len(row), np.inf)
+        share = np.clip((away_s - walks.step_s) / SLOWING_S, 0.0, 1.0)
+        rate = share**2 * (3.0 - 2.0 * share)
         row[:] = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1])))
     return clock
 
