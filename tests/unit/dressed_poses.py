@@ -30,7 +30,7 @@ def posed(name: str, pelvis_m: np.ndarray) -> BodyMotion:
         turn = Rotation.from_euler("xy", [about_x, about_y], degrees=True)
         turns[BODY_JOINTS.index(joint)] = turn.as_matrix()
     world = turns.copy()
-    for joint, parent in enumerate(BODY_PARENTS):
+    for index, parent in enumerate(BODY_PARENTS):
         if parent >= 0:
-            world[joint] = world[parent] @ turns[joint]
+            world[index] = world[parent] @ turns[index]
     return BodyMotion(0, 24.0, world[None], pelvis_m[None], np.zeros((1, 4), dtype=bool))

@@ -29,7 +29,7 @@ RIM_M = 0.008
 def worn(room: int, actor: int) -> tuple[Wearer, Outfit, Dressed]:
     seed = StageSeed(7, room, "bodies")
     person = draw_person(actor, ActorsConfig(), seed)
-    wearer = Wearer(anny._shaped(person))
+    wearer = Wearer(anny.shaped(person))
     return wearer, person.outfit, dress(wearer, person.outfit, seed)
 
 

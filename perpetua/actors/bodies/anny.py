@@ -54,7 +54,7 @@ class AnnyModel:
     def draw(self, actor: int, config: ActorsConfig, seed: StageSeed) -> Body:
         """The body of one actor of a room."""
         person = draw_person(actor, config, seed)
-        wearer = Wearer(_shaped(person))
+        wearer = Wearer(shaped(person))
         rng = seed.stream("looks", actor)
         dressed = dress(wearer, person.outfit, seed)
         hair = make_hair(wearer, person.hair, person.complexion.hair, rng)
@@ -64,7 +64,7 @@ class AnnyModel:
         return AnnyBody(person.description, skeleton, parts, vertices_m, weights, bound)
 
 
-def _shaped(person: Person) -> Float64[np.ndarray, "P 3"]:
+def shaped(person: Person) -> Float64[np.ndarray, "P 3"]:
     """Vertices of the person, at the height trait that gives the wanted stature (which is linear in it)."""
 
     def at(height: float) -> Float64[np.ndarray, "P 3"]:
