@@ -118,6 +118,9 @@ def take_surfaces(metres_per_unit: float, suffix: str, up_axis: str) -> tuple[li
         thing, original = instance.object, instance.object.original
         if not instance.show_self or original.hide_render:
             continue
+        if instance.is_instance and original.type != "MESH":
+            # The mesh that Blender shows for a curve or text, beside the thing itself; converting it crashes.
+            continue
         matrix = placed @ instance.matrix_world
         if thing.type == "LIGHT":
             lamps.append(_new_object(original.name, original.data, matrix))
