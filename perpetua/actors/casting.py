@@ -26,6 +26,19 @@ class Role:
     sits: bool
 
 
+@dataclass(frozen=True)
+class _Line:
+    """A description, and what its words say of pace and sitting."""
+
+    words: str
+    paces: frozenset[str]
+    sits: bool
+
+    @classmethod
+    def read(cls, words: str) -> "_Line":
+        return cls(words, stated_paces(words), wants_seat(words))
+
+
 def cast_actors(count: int, config: MotionConfig, shares: PaceShares, seats: int, seed: StageSeed) -> tuple[Role, ...]:
     """A role for each actor, no two alike while the list lasts.
 
@@ -42,21 +55,20 @@ def cast_actors(count: int, config: MotionConfig, shares: PaceShares, seats: int
     Raises:
         ConfigError: ``actors.motion.actions`` names no list of descriptions.
     """
-    descriptions = action_descriptions(config)
-    order = seed.stream("actions").permutation(len(descriptions))
-    waiting: list[str] = []
+    lines = [_Line.read(words) for words in action_descriptions(config)]
+    order = seed.stream("actions").permutation(len(lines))
+    waiting: list[_Line] = []
     roles: list[Role] = []
     for actor in range(count):
-        waiting = waiting or [descriptions[index] for index in order]
+        waiting = waiting or [lines[index] for index in order]
         pace = _draw_pace(shares, seed, actor)
         free_seats = seats - sum(role.sits for role in roles)
-        description = waiting[0] if config.descriptions else _choose(waiting, pace, free_seats)
-        waiting.remove(description)
-        stated = stated_paces(description)
-        if wants_seat(description) and free_seats <= 0:
-            logger.warning("no seat is left for '%s' in this room, so actor %d stays on its feet", description, actor)
-        paces = tuple(name for name in PACES if name in stated) or (pace,)
-        roles.append(Role(description, paces, wants_seat(description) and free_seats > 0))
+        line = waiting[0] if config.descriptions else _choose(waiting, pace, free_seats)
+        waiting.remove(line)
+        if line.sits and free_seats <= 0:
+            logger.warning("no seat is left for '%s' in this room, so actor %d stays on its feet", line.words, actor)
+        paces = tuple(name for name in PACES if name in line.paces) or (pace,)
+        roles.append(Role(line.words, paces, line.sits and free_seats > 0))
     return tuple(roles)
 
 
@@ -66,11 +78,11 @@ def _draw_pace(shares: PaceShares, seed: StageSeed, actor: int) -> str:
     return PACES[int(drawn)]
 
 
-def _choose(waiting: list[str], pace: str, free_seats: int) -> str:
-    """The first description that suits; nobody jogs or stands about at what could be said of a walker."""
-    possible = [words for words in waiting if free_seats > 0 or not wants_seat(words)] or waiting
-    stating = [words for words in possible if pace in stated_paces(words)]
-    silent = [words for words in possible if not stated_paces(words)]
+def _choose(waiting: list[_Line], pace: str, free_seats: int) -> _Line:
+    """The first line that suits; nobody jogs or stands about at what could be said of a walker."""
+    possible = [line for line in waiting if free_seats > 0 or not line.sits] or waiting
+    stating = [line for line in possible if pace in line.paces]
+    silent = [line for line in possible if not line.paces]
     suitable = (stating or silent) if pace in ("stand", "jog") else stating + silent
     return min(suitable or possible, key=waiting.index)
 
