@@ -157,7 +157,7 @@ def _move_origin(made: Made, dimensions_m: list[float]) -> None:
 
 
 def _settle(made: Made) -> None:
-    gone = {thing.name for thing in settle(made.things, made.categories)}
+    gone = {thing.name for thing in settle(made.things, made.categories, made.lamps)}
     kept = [k for k, thing in enumerate(made.things) if thing.name not in gone]
     left_out = [thing for thing in made.things if thing.name in gone]
     made.things, made.categories = [made.things[k] for k in kept], [made.categories[k] for k in kept]

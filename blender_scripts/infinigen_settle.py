@@ -2,7 +2,7 @@
 """Lets things that hang a little in the air down on what is below them, and leaves out small things that cannot be.
 
 Infinigen places things by their unsubdivided meshes, so on a sofa whose seat is rounded in the picture a cushion may
-hang some centimetres above it. Ceiling lamps are lifted to the ceiling instead.
+hang some centimetres above it. Ceiling lamps that touch nothing are lifted, with their light, to the ceiling instead.
 """
 
 import bpy
@@ -15,6 +15,10 @@ from plain_meshes import world_triangles
 CLOSE_M, FURTHEST_M = 0.01, 0.15
 FURTHEST_LAMP_M = 0.6
 CEILING_LAMP = "ceiling_lamp"
+# A lamp in a shaft is held by the shaft's sides, where they are this close.
+TOUCH_M = 0.03
+# A lamp's light lies in it or this close to it.
+LIGHT_REACH_M = 0.1
 PLACES_PER_SIDE = 16
 MIN_SPACING_M = 0.01
 MAX_SURFACES = 8
@@ -23,7 +27,9 @@ _ASIDE_M = np.array([0.0007, 0.0004, 0.0])
 _PAST_SURFACE_M = 1e-4
 
 
-def settle(things: list[bpy.types.Object], categories: list[str]) -> list[bpy.types.Object]:
+def settle(
+    things: list[bpy.types.Object], categories: list[str], lights: list[bpy.types.Object]
+) -> list[bpy.types.Object]:
     """Moves things down to their supports, the lowest first; returns those that should be left out."""
     loose = [
         (world_triangles(thing)[0], thing, category)
@@ -31,7 +37,7 @@ def settle(things: list[bpy.types.Object], categories: list[str]) -> list[bpy.ty
         if category in SMALL | STANDING
     ]
     loose = [entry for entry in loose if len(entry[0])]
-    _lift_lamps([thing for thing, category in zip(things, categories, strict=True) if category == CEILING_LAMP])
+    _lift_lamps([thing for thing, category in zip(things, categories, strict=True) if category == CEILING_LAMP], lights)
     gone = []
     for vertices_m, thing, category in sorted(loose, key=lambda entry: (entry[0][:, 2].min(), entry[1].name)):
         gap_m = _gap_m(thing, vertices_m)
@@ -46,12 +52,29 @@ def settle(things: list[bpy.types.Object], categories: list[str]) -> list[bpy.ty
     return gone
 
 
-def _lift_lamps(lamps: list[bpy.types.Object]) -> None:
+def _lift_lamps(lamps: list[bpy.types.Object], lights: list[bpy.types.Object]) -> None:
     for lamp in lamps:
-        gap_m = _gap_m(lamp, world_triangles(lamp)[0], up=True)
-        if CLOSE_M < gap_m <= FURTHEST_LAMP_M:
-            lamp.location.z += gap_m
+        vertices_m = world_triangles(lamp)[0]
+        gap_m = _gap_m(lamp, vertices_m, up=True)
+        if CLOSE_M < gap_m <= FURTHEST_LAMP_M and not _held_aside(lamp, vertices_m):
+            low_m, high_m = vertices_m.min(axis=0), vertices_m.max(axis=0)
+            low_m, high_m = low_m - LIGHT_REACH_M, high_m + LIGHT_REACH_M
+            places_m = [np.array(light.location) for light in lights]
+            inside = [bool(((low_m <= place_m) & (place_m <= high_m)).all()) for place_m in places_m]
+            for thing in [lamp, *(light for light, own in zip(lights, inside, strict=True) if own)]:
+                thing.location.z += gap_m
     bpy.context.view_layer.update()
+
+
+def _held_aside(lamp: bpy.types.Object, vertices_m: np.ndarray) -> bool:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for place_m in _underside_m(vertices_m):
+        for along in (Vector((1, 0, 0)), Vector((-1, 0, 0)), Vector((0, 1, 0)), Vector((0, -1, 0))):
+            start = Vector(place_m) - TOUCH_M * along
+            hit = bpy.context.scene.ray_cast(depsgraph, start, along, distance=2.0 * TOUCH_M)
+            if hit[0] and hit[4].name != lamp.name:
+                return True
+    return False
 
 
 def _gap_m(thing: bpy.types.Object, vertices_m: np.ndarray, up: bool = False) -> float:

@@ -48,12 +48,21 @@ def settled():
         "cabinet": ("cabinet", box("cabinet", (2, 2, 1.0), (2.5, 2.5, 1.5))),
         "ceiling": ("ceiling", box("ceiling", (-3, -3, 2.7), (3, 3, 2.8))),
         "lamp": ("ceiling_lamp", box("lamp", (1, -1, 2.3), (1.2, -0.8, 2.5))),
+        "held": ("ceiling_lamp", box("held", (-1, 1, 2.3), (-0.8, 1.2, 2.5))),
+        "shaft": ("ceiling", box("shaft", (-0.79, 1, 2.2), (-0.7, 1.2, 2.7))),
         "chair": ("chair", box("chair", (-2, -2, -0.005), (-1.5, -1.5, 0.8))),
     }
+    lights = []
+    for name, place in (("own", (1.1, -0.9, 2.25)), ("other", (0, 0, 2.25))):
+        light = bpy.data.objects.new(name, bpy.data.lights.new(name, "POINT"))
+        light.location = place
+        bpy.context.scene.collection.objects.link(light)
+        lights.append(light)
     bpy.context.view_layer.update()
     things = [thing for _, thing in made.values()]
-    gone = infinigen_settle.settle(things, [category for category, _ in made.values()])
-    return {"gone": sorted(thing.name for thing in gone), "moved": {thing.name: thing.location.z for thing in things}}
+    gone = infinigen_settle.settle(things, [category for category, _ in made.values()], lights)
+    moved = {thing.name: thing.location.z for thing in things + lights}
+    return {"gone": sorted(thing.name for thing in gone), "moved": moved}
 
 def tamed():
     clear()
@@ -172,7 +181,11 @@ def test_things_settle_on_what_is_below_them(answer: dict[str, Any]) -> None:
 
 
 def test_ceiling_lamps_are_lifted_to_the_ceiling(answer: dict[str, Any]) -> None:
-    assert answer["settled"]["moved"]["lamp"] == pytest.approx(0.2, abs=1e-4)
+    moved = answer["settled"]["moved"]
+    assert moved["lamp"] == pytest.approx(0.2, abs=1e-4)
+    assert moved["own"] == pytest.approx(2.45, abs=1e-4)
+    assert moved["other"] == pytest.approx(2.25)
+    assert moved["held"] == 0.0
 
 
 def test_small_things_in_the_air_are_left_out_with_what_stands_on_them(answer: dict[str, Any]) -> None:
