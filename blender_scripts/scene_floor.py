@@ -153,8 +153,15 @@ def _plan(corners_m: np.ndarray, surface: np.ndarray, area_m2: np.ndarray, upwar
     faces = np.zeros(len(corners_m), bool)
     faces[np.flatnonzero(surface)[inside]] = True
     kept_m = corners_m[faces]
-    z_m = float(np.average(kept_m[:, :, 2].mean(1), weights=area_m2[faces]))
+    z_m = _median(kept_m[:, :, 2].mean(1), area_m2[faces])
     return Floor(z_m, upward, cells, cell_m, low_m, faces, kept_m[:, :, :2].min((0, 1)), kept_m[:, :, :2].max((0, 1)))
+
+
+def _median(values: np.ndarray, weights: np.ndarray) -> float:
+    """The value in the middle of the weights, which a rug on the floor does not move."""
+    order = np.argsort(values, kind="stable")
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
 def _spread(flat_m: np.ndarray, area_m2: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:

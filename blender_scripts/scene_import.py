@@ -112,6 +112,7 @@ def take_surfaces(metres_per_unit: float, suffix: str, up_axis: str) -> tuple[li
     pieces: list[Piece] = []
     lamps: list[bpy.types.Object] = []
     names: list[str] = []
+    lamp_names: list[str] = []
     meshes: dict[tuple, bpy.types.Mesh] = {}
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
@@ -124,6 +125,7 @@ def take_surfaces(metres_per_unit: float, suffix: str, up_axis: str) -> tuple[li
         matrix = placed @ instance.matrix_world
         if thing.type == "LIGHT":
             lamps.append(_new_object(original.name, original.data, matrix))
+            lamp_names.append(original.name)
         elif thing.type in SURFACES:
             key = _sharing_key(thing, original)
             if key not in meshes:
@@ -138,8 +140,9 @@ def take_surfaces(metres_per_unit: float, suffix: str, up_axis: str) -> tuple[li
     if not pieces:
         raise Refused("empty", "it holds nothing that has a surface and is rendered: export meshes")
     _keep_only([piece.thing for piece in pieces], lamps)
-    for piece, name in zip(pieces, names, strict=True):
-        piece.thing.name = name
+    # The file's own objects are gone, and their names free.
+    for thing, name in zip([piece.thing for piece in pieces] + lamps, names + lamp_names, strict=True):
+        thing.name = name
     _scale_lamps(lamps, metres_per_unit)
     return pieces, lamps
 
