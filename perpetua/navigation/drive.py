@@ -22,6 +22,8 @@ TRUNCATE = 3.0
 # Turns on the spot start and end gently.
 SETTLING_S = 0.3
 MIN_PAUSE_S = 0.5
+# A first way shorter than this is none: the walk begins with a pause.
+AT_ONCE_M = 1e-3
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,9 @@ def drive(stretches: list[Stretch], stops: list[Stop], steps: int, step_s: float
     travelled_m, heading_rad = np.zeros(len(clock_s)), np.zeros(len(clock_s))
     ways = [_way(stretch, number == 0) for number, stretch in enumerate(stretches)]
     begin_s, begin_m, facing_rad = float(clock_s[0]), 0.0, float(ways[0].direction_rad[0])
+    if ways[0].distance_m[-1] < AT_ONCE_M:
+        # Who begins with a pause has been at it for a while.
+        begin_s -= SETTLING_S + 2.0 * TRUNCATE * SMOOTHING_S
     pauses: list[Pause] = []
     for number, (way, stop) in enumerate(zip(ways, stops, strict=True)):
         moving = clock_s >= begin_s

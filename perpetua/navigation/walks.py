@@ -4,6 +4,7 @@ A walk is a chain of legs between targets. Targets are drawn on floor that has b
 turns on the way and as far as the pace asks for; now and then the target is a spot worth a pause.
 """
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -29,8 +30,8 @@ STANDING_S = (2.5, 5.0)
 SITTING_S = (4.5, 7.5)
 # Time to get up and go, if the sequence is long enough for it.
 AFTER_SITTING_S = 2.5
-# Sequences shorter than this leave no time to go to a seat and sit.
-MIN_SECONDS_TO_SIT = 6.0
+# Sequences shorter than this leave no time to go to a seat and sit: one is seated all the time.
+SECONDS_TO_SIT_DOWN = 6.0
 SEAT_WAY_M = (0.8, 3.0)
 
 
@@ -90,6 +91,11 @@ def random_walk(
         start_m: where it starts; the nearest free cell is taken.
     """
     seconds, start = steps * step_s, floor.nearest(start_m)
+    if manner.seats and seconds < SECONDS_TO_SIT_DOWN:
+        seat = min(manner.seats, key=lambda spot: math.dist(spot.place_m, start_m))
+        return drive(
+            [_no_way(np.array(seat.place_m), seat.facing_rad)], [Stop(seat, 2.0 * seconds + 2.0)], steps, step_s
+        )
     if not manner.speeds_mps or _reach_m(floor.ways_from(start)) < MIN_LEG_M:
         return _stand(floor, rng, spots, start, steps, step_s)
     stretches, stops = _wander(floor, rng, manner, _Spots(floor, spots), seconds, start)
@@ -124,7 +130,7 @@ def _wander(
     floor: WalkableFloor, rng: np.random.Generator, manner: Manner, spots: _Spots, seconds: float, start: int
 ) -> tuple[list[Stretch], list[Stop]]:
     """Stretches and the stops that end them, long enough for the time."""
-    seats = manner.seats if seconds >= MIN_SECONDS_TO_SIT else ()
+    seats = manner.seats
     stretches: list[Stretch] = []
     stops: list[Stop] = []
     if not seats and rng.uniform() < manner.pause_share and len(spots.cell):

@@ -137,10 +137,13 @@ def test_who_is_to_sit_turns_the_back_to_the_seat_for_several_seconds_then_goes_
     assert math.cos(walk.heading_rad[sitting.first_step] - SEAT.facing_rad) > 0.999
 
 
-def test_nobody_sits_when_time_is_short() -> None:
+def test_who_has_no_time_to_go_to_a_seat_is_seated_from_first_to_last() -> None:
     manner = Manner((1.15,), (1.0,), 0.0, (SEAT,))
     walk = random_walk(FLOOR, np.random.default_rng(1), manner, SPOTS, 100, STEP_S, START_M)
-    assert not walk.pauses
+    (sitting,) = walk.pauses
+    assert sitting.spot == SEAT
+    assert (sitting.first_step, sitting.last_step) == (0, 99)
+    assert np.ptp(walk.position_m, axis=0).max() < 1e-5
 
 
 def test_standing_stays_at_one_spot_and_looks_at_what_is_seen_from_there() -> None:
@@ -148,6 +151,7 @@ def test_standing_stays_at_one_spot_and_looks_at_what_is_seen_from_there() -> No
     walk = random_walk(FLOOR, np.random.default_rng(1), Manner((), (), 0.3), more, 480, STEP_S, np.array([0.5, 1.0]))
     assert np.ptp(walk.position_m, axis=0).max() < 1e-4
     assert {pause.spot.object_index for pause in walk.pauses} == {3, 9}
+    assert walk.pauses[0].first_step == 0
 
 
 def test_drive_slows_down_for_a_curve_and_stops_at_the_end() -> None:
