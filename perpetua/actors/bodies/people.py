@@ -14,8 +14,8 @@ from perpetua.seeding import StageSeed
 # Linear RGB of skin from light to deep, along which each ancestry covers a range.
 _TONES = np.array(
     [
-        [0.60, 0.40, 0.31],
-        [0.53, 0.33, 0.24],
+        [0.55, 0.365, 0.285],
+        [0.50, 0.31, 0.225],
         [0.43, 0.25, 0.17],
         [0.33, 0.18, 0.11],
         [0.18, 0.09, 0.055],

@@ -70,7 +70,7 @@ _BODICES = (
     TopPattern(0.145, 0.085, 0.115, True, "none", 0.007, 0.0025, 0.003),
     TopPattern(0.400, 0.085, 0.060, False, "none", 0.007, 0.0025, 0.004),
 )
-_DRESS_SKIRT = SkirtPattern(0.110, -0.400, 0.004, 0.003)
+_DRESS_SKIRT = SkirtPattern(0.125, -0.400, 0.004, 0.003)
 _DRESS_FABRICS = ("print", "dots", "plain", "checks", "stripes")
 _DRESS_SHARE = 0.3
 _TOP_FABRICS: dict[str, tuple[str, ...]] = {
