@@ -14,7 +14,7 @@ from perpetua.seeding import StageSeed
 # What is sat on: so far behind the hip joints, along this share of the thighs, and so far to either side.
 _BUTTOCK_M, _THIGH_SHARE, _HALF_WIDTH_M = 0.08, 0.7, 0.22
 # Loose cloth that hangs lower than flesh can be is pressed flat.
-_SEAT_LIMITS_M = (0.06, 0.115)
+_SEAT_LIMITS_M = (0.06, 0.14)
 
 
 def draw_bodies(config: ActorsConfig, seed: StageSeed) -> tuple[Body, ...]:

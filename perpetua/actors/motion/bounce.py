@@ -10,9 +10,9 @@ from perpetua.actors.motion.path import RoutePath
 from perpetua.actors.types import Skeleton
 
 # Share of the leg by which the pelvis stands lower than with straight legs: at rest, more when walking and running.
-_STANDING_DROP, _WALKING_DROP, _RUNNING_DROP = 0.008, 0.008, 0.045
+_STANDING_DROP, _WALKING_DROP, _RUNNING_DROP = 0.008, 0.008, 0.075
 # A jogger's hips go up and down by this share of the leg about their mean.
-_BOUNCE = 0.042
+_BOUNCE = 0.055
 _FLOOR_SOFTNESS_S = 0.12
 
 

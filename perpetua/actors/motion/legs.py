@@ -15,7 +15,7 @@ SIDES = ("left", "right")
 # A knee keeps about nine degrees of bend.
 _REACH_SHARE = 0.9965
 # The pelvis comes down before a leg is fully stretched, so that it never has to jerk.
-_FORESIGHT_S = 0.09
+WALKING_FORESIGHT_S = 0.09
 
 
 @dataclass(frozen=True)
@@ -61,19 +61,23 @@ def pelvis_heights_m(
     legs: tuple[Leg, Leg],
     ankles_m: tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]],
     step_s: float,
+    slack_m: tuple[Float64[np.ndarray, " N"], Float64[np.ndarray, " N"]] | None = None,
+    foresight_s: float = WALKING_FORESIGHT_S,
 ) -> Float64[np.ndarray, " N"]:
     """The pelvis's height at evenly spaced times: as near to ``nominal_m`` as the reach of both legs allows.
 
+    A foot may hold the body down by ``slack_m`` less than its leg's reach asks for: it is taken along.
     The lower envelope over a short window, averaged over the same window, stays under the limit at every time.
     """
     highest_m = nominal_m
-    for leg, ankle_m in zip(legs, ankles_m, strict=True):
+    for side, (leg, ankle_m) in enumerate(zip(legs, ankles_m, strict=True)):
         hip_m = rotate(world_from_pelvis, leg.hip_m)
         away_m = np.linalg.norm(ankle_m[:, :2] - pelvis_xy_m - hip_m[:, :2], axis=1)
         # A foot out of reach at any height must not pull the pelvis to the floor.
         drop_m = np.sqrt(np.maximum(leg.reach_m**2 - away_m**2, (0.75 * leg.reach_m) ** 2))
-        highest_m = np.minimum(highest_m, ankle_m[:, 2] + drop_m - hip_m[:, 2])
-    window = max(1, round(_FORESIGHT_S / step_s))
+        limit_m = ankle_m[:, 2] + drop_m - hip_m[:, 2]
+        highest_m = np.minimum(highest_m, limit_m if slack_m is None else limit_m + slack_m[side])
+    window = max(1, round(foresight_s / step_s))
     lowest_m = minimum_filter1d(highest_m, 2 * window + 1, mode="nearest")
     return np.asarray(gaussian_filter1d(lowest_m, 0.5 * window, radius=window, mode="nearest"))
 

@@ -44,6 +44,7 @@ from perpetua.seeding import StageSeed
 _FINE_HZ = 120.0
 # Filters over time see this much of what comes before the first and after the last frame.
 _FILTER_MARGIN_S = 0.8
+_TAKEN_ALONG_M, _RUNNING_FORESIGHT_S = 0.12, 0.03
 # From the thigh's bone up to a wrist that rests on it, and how far along the thigh.
 _WRIST_OVER_THIGH_M, _ALONG_THIGH = 0.105, 0.62
 
@@ -189,15 +190,21 @@ def _pelvis_m(
     walker: _Walker, trunk: Trunk, stride: _Stride, score: Score, clock: _Clock
 ) -> Float64[np.ndarray, "N 3"]:
     legs = (leg_of(walker.skeleton, "left"), leg_of(walker.skeleton, "right"))
-    ankles_m = (stride.tracks[0].ankle_m, stride.tracks[1].ankle_m)
     standing_m = nominal_height_m(
         walker.path, walker.skeleton, stride.plants, legs[0].reach_m, score.drop, clock.time_s
     )
     pelvis_m = np.column_stack([trunk.pelvis_xy_m, standing_m])
     pelvis_m = lowered_pelvis(walker.sittings, pelvis_m, trunk.world_from_pelvis, walker.skeleton, clock.time_s)
-    pelvis_m[:, 2] = pelvis_heights_m(
-        pelvis_m[:, 2], pelvis_m[:, :2], trunk.world_from_pelvis, legs, ankles_m, clock.step_s
-    )
+    ankles_m = (stride.tracks[0].ankle_m, stride.tracks[1].ankle_m)
+    reaching = (pelvis_m[:, 2], pelvis_m[:, :2], trunk.world_from_pelvis, legs, ankles_m, clock.step_s)
+    height_m = pelvis_heights_m(*reaching)
+    run = walker.path.run_share(clock.time_s)
+    if run.any():
+        # Runners bounce faster than walkers ease their hips down, and their feet in the air are taken along.
+        slack_m = (_TAKEN_ALONG_M * run * ~stride.tracks[0].on_floor, _TAKEN_ALONG_M * run * ~stride.tracks[1].on_floor)
+        bouncing_m = pelvis_heights_m(*reaching, slack_m, _RUNNING_FORESIGHT_S)
+        height_m = height_m + run * (bouncing_m - height_m)
+    pelvis_m[:, 2] = height_m
     return pelvis_m
 
 

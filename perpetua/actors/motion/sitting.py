@@ -22,13 +22,15 @@ from perpetua.rooms.types import Room
 logger = logging.getLogger(__name__)
 
 DOWN_S, UP_S = 1.4, 1.3
-_SETTLE_S, _LEAST_REST_S, _BACK_STEP_MPS, _LEAST_BACK_S = 0.35, 0.8, 0.35, 0.8
+_SETTLE_S, _LEAST_REST_S, _BACK_STEP_MPS, _LEAST_BACK_S = 0.25, 0.6, 0.4, 0.6
 # Flesh between the hip joints and the seat, in lengths of the thigh, where the body does not say.
 _FLESH_SHARE = 0.235
 # Under the thigh there is less of it, and a cushion gives way by so much.
-_THIGH_SHARE, _GIVE_M = 0.85, 0.012
+_THIGH_SHARE, _GIVE_M = 0.85, 0.003
 # From the hip joints back to the back of the body, and from ankle to heel with a little room.
 _BACK_FLESH_M, _HEEL_M = 0.16, 0.11
+# The front of knees, shins and toes: ahead of the ankle, and above the floor; to either side; and the room they need.
+_LEG_FRONT_M, _LEG_ASIDE_M, _LEG_ROOM_M = ((0.05, 0.45), (0.08, 0.25), (0.16, 0.08)), 0.13, 0.05
 # Heels rise at most this far from the floor on a high seat, radians.
 _MOST_HEEL_RAD = 0.42
 _MOST_SINK_M = 0.018
@@ -195,7 +197,7 @@ def _plan(dwell: Dwell, route: Route, skeleton: Skeleton, caster: Caster, fps: f
     hip_m, ahead_m, heel_rad = place
     lean_rad = _rest_lean_rad(seat, hip_m, skeleton)
     times_s = _times_s(dwell, route, hip_m, ahead_m, seat.facing_rad, fps)
-    if lean_rad is None or times_s is None:
+    if lean_rad is None or times_s is None or not _legs_fit(seat, hip_m, ahead_m, caster):
         return None
     ankle_ahead_m = float(bone(skeleton, "pelvis", "left_ankle")[0])
     spot_m = hip_m[:2] + (ahead_m - ankle_ahead_m) * _ahead(seat.facing_rad)
@@ -262,6 +264,18 @@ def _sink_m(
         return float("inf")
     bone_m = hip[1] + (knee[1] - hip[1]) * edge_m / knee[0]
     return float(seat_m - (bone_m - _THIGH_SHARE * flesh_m))
+
+
+def _legs_fit(seat: _Seat, hip_m: Float64[np.ndarray, "3"], ahead_m: float, caster: Caster) -> bool:
+    """Whether nothing stands where knees, shins and toes come to be."""
+    ahead = _ahead(seat.facing_rad)
+    left = np.array([-ahead[1], ahead[0]])
+    front_m = [
+        np.append(hip_m[:2] + (ahead_m + forward_m) * ahead + aside_m * left, seat.floor_m + height_m)
+        for forward_m, height_m in _LEG_FRONT_M
+        for aside_m in (-_LEG_ASIDE_M, _LEG_ASIDE_M)
+    ]
+    return bool(caster.closest_distance(np.array(front_m), 2.0 * _LEG_ROOM_M).min() >= _LEG_ROOM_M)
 
 
 def _rest_lean_rad(seat: _Seat, hip_m: Float64[np.ndarray, "3"], skeleton: Skeleton) -> float | None:

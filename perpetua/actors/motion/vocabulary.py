@@ -162,7 +162,7 @@ ACTIONS: dict[str, Action] = {
     ),
     "scratch the head": Action(
         "scratch", "head hair",
-        HandPose((0.20, 0.00, 0.56), (0.3, 1.0, 0.1), (-0.3, -1.0, -0.4), 0.5, "claw",
+        HandPose((0.18, -0.02, 0.47), (0.3, 1.0, 0.0), (-0.3, -1.0, -0.4), 0.5, "claw",
                  swing=(0.035, 0.0, 0.02), swing_hz=2.6),
         move=Move(head_pitch=0.1, head_tilt=0.08), hold_s=(1.8, 3.0), pause_s=(3.0, 6.0), rise_s=0.7,
     ),
@@ -222,7 +222,7 @@ ACTIONS: dict[str, Action] = {
     ),
     "salute": Action(
         "salute", "",
-        HandPose((0.26, 0.10, 0.36), (0.2, 1.0, 0.1), (0.2, -0.6, -1.0), 0.0, "flat"),
+        HandPose((0.25, 0.03, 0.33), (0.2, 1.0, 0.0), (0.2, -0.6, -1.0), 0.0, "flat"),
         hold_s=(1.4, 2.4), pause_s=(2.5, 5.0), rise_s=0.5,
     ),
     "thumbs up": Action(
