@@ -101,16 +101,26 @@ def ceiling_height_m(corners_m: np.ndarray, floor: Floor) -> tuple[float, bool]:
     top_m = float(corners_m[over, :, 2].max()) - floor.z_m
     faces = _level_faces(corners_m)
     high = over & faces.level & (faces.z_m - floor.z_m > CEILING_SHARE * top_m)
-    if high.any():
-        window_m = 0.01 * top_m
-        bins = np.floor((faces.z_m[high] - floor.z_m) / window_m).astype(np.int64)
-        area_m2 = np.bincount(bins, faces.area_m2[high])
-        covering = np.flatnonzero(area_m2 + np.append(area_m2[1:], 0.0) >= CEILING_COVER * floor.area_m2)
-        if len(covering):
-            first = high.copy()
-            first[high] = (bins == covering[0]) | (bins == covering[0] + 1)
-            return float(corners_m[first, :, 2].min()) - floor.z_m, True
+    # A ceiling looks down, unless its normals are wrong; a large table's top looks up.
+    for chosen in (high & ~faces.upward, high):
+        height_m = _lowest_cover_m(faces, chosen, floor, 0.01 * top_m)
+        if height_m is not None:
+            return height_m, True
     return top_m, False
+
+
+def _lowest_cover_m(faces: _LevelFaces, chosen: np.ndarray, floor: Floor, window_m: float) -> float | None:
+    """The lowest height above the floor at which faces cover enough of it."""
+    if not chosen.any():
+        return None
+    height_m, area_m2 = faces.z_m[chosen] - floor.z_m, faces.area_m2[chosen]
+    bins = np.floor(height_m / window_m).astype(np.int64)
+    per_bin_m2 = np.bincount(bins, area_m2)
+    covering = np.flatnonzero(per_bin_m2 + np.append(per_bin_m2[1:], 0.0) >= CEILING_COVER * floor.area_m2)
+    if len(covering) == 0:
+        return None
+    first = (bins == covering[0]) | (bins == covering[0] + 1)
+    return float(np.average(height_m[first], weights=area_m2[first]))
 
 
 def _level_faces(corners_m: np.ndarray) -> _LevelFaces:

@@ -197,7 +197,7 @@ def _only_walls(path: Path) -> None:
 
 
 def _full(path: Path) -> None:
-    write_scene(_room_of([*_floor(), _box("cabinet", (-2.5, -2.5, 0), (2.5, 2.5, 2))]), path)
+    write_scene(_room_of([*_floor(), _box("cabinet", (-2.35, -2.35, 0), (2.35, 2.35, 1.5))]), path)
 
 
 def _not_a_number(path: Path) -> None:
