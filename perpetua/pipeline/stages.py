@@ -322,7 +322,7 @@ STAGES = (
     Stage(
         60,
         "cameras",
-        2,
+        3,
         ("room", "routes", "actors"),
         _settings("cameras", "actors.routes", "navigation", _FRAMES, _FPS, "render.width_px", "render.height_px"),
         _cameras,
