@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64, Int32
+from scipy.spatial import ConvexHull
 
 from perpetua.actors.clothing.piece import Surface
 from perpetua.actors.clothing.surface import averaging, border_edges, positive, vertex_normals
@@ -12,18 +13,21 @@ _NORMAL_PASSES = 12
 
 
 _PASSES = 40
+_LEVEL_M = 0.02
 
 
 @dataclass(frozen=True)
 class Drape:
     """Per vertex, ``gap_m`` is the least distance from the body, ``hold`` how strongly cloth keeps its ease.
 
-    ``fold_m`` is how far folds stand out.
+    ``fold_m`` is how far folds stand out; ``bridge`` (0 to 1) how far cloth is stretched around the whole body rather
+    than into its hollows.
     """
 
     gap_m: Float64[np.ndarray, " P"]
     hold: Float64[np.ndarray, " P"]
     fold_m: Float64[np.ndarray, " P"]
+    bridge: Float64[np.ndarray, " P"]
 
 
 def smooth_normals(surface: Surface) -> Float64[np.ndarray, "P 3"]:
@@ -49,7 +53,37 @@ def draped(surface: Surface, ease_m: Float64[np.ndarray, " P"], how: Drape) -> F
     for _ in range(_PASSES):
         cloth = (1.0 - hold) * (0.4 * cloth + 0.6 * (mean @ cloth)) + hold * wanted
         cloth = _pushed_out(cloth, surface.vertices_m, normal, how.gap_m)
+    cloth = _bridged(cloth, how.bridge)
     return _pushed_out(cloth + how.fold_m[:, None] * normal, surface.vertices_m, normal, how.gap_m)
+
+
+def _bridged(cloth_m: Float64[np.ndarray, "P 3"], share: Float64[np.ndarray, " P"]) -> Float64[np.ndarray, "P 3"]:
+    """The cloth moved outward in the horizontal, by a share of the way to the convex hull of its own level."""
+    concerned = np.flatnonzero(share > 0.0)
+    moved = cloth_m.copy()
+    if len(concerned) == 0:
+        return moved
+    places = cloth_m[concerned]
+    lowest, highest = float(places[:, 2].min()), float(places[:, 2].max())
+    levels = np.linspace(lowest, highest, max(2, round((highest - lowest) / _LEVEL_M) + 1))
+    outward_m = np.zeros((len(levels), len(concerned)))
+    middle = 0.5 * (places[:, :2].min(axis=0) + places[:, :2].max(axis=0))
+    offset = places[:, :2] - middle
+    reach_m = np.maximum(np.linalg.norm(offset, axis=1), 1e-9)
+    for row, level in enumerate(levels):
+        slab = np.abs(places[:, 2] - level) < 1.5 * _LEVEL_M
+        if slab.sum() > 8:
+            sides = ConvexHull(offset[slab]).equations
+            slope = (offset / reach_m[:, None]) @ sides[:, :2].T
+            with np.errstate(divide="ignore"):
+                hull_m = np.where(slope > 1e-6, -sides[:, 2] / np.maximum(slope, 1e-6), np.inf).min(axis=1)
+            outward_m[row] = np.maximum(hull_m - reach_m, 0.0)
+    # Between two levels, some of each.
+    at = np.clip((places[:, 2] - lowest) / max(highest - lowest, 1e-9) * (len(levels) - 1), 0.0, len(levels) - 1.001)
+    below, column = at.astype(np.int64), np.arange(len(concerned))
+    push_m = (below + 1 - at) * outward_m[below, column] + (at - below) * outward_m[below + 1, column]
+    moved[concerned, :2] += (share[concerned] * push_m / reach_m)[:, None] * offset
+    return moved
 
 
 def _pushed_out(

@@ -111,7 +111,10 @@ def sew_top(
     arm = arm_share(seamed.weights)
     long_sleeves = pattern.sleeve_m > _SHORT_SLEEVE_M
     fold_m = pattern.fold_m * (0.35 + 0.65 * edge) * top_folds(seamed.template_m, arm, long_sleeves, rng)
-    cloth_m = draped(seamed, ease_m, Drape(gap_m, _top_hold(pattern, seamed, field_m), fold_m))
+    # Below the chest a top spans hollows; sleeves and shoulders fit.
+    bridge = np.interp(seamed.template_m[:, 2], [0.12, 0.30], [0.85, 0.0]) * (arm < 0.3)
+    how = Drape(gap_m, _top_hold(pattern, seamed, field_m), fold_m, bridge)
+    cloth_m = draped(seamed, ease_m, how)
     moves = {"wrist": _CUFF_MOVE, "hip": _HEM_MOVES[pattern.hem_z_m > _AT_WAIST_Z_M]}
     outside = replace(seamed, vertices_m=cloth_m, weights=_onto(_eased_weights(seamed, 6), moves))
     sewn = hemmed(outside, field_m, _HEM_M, pattern.thickness_m)
@@ -163,7 +166,8 @@ def sew_trousers(
     fold_m = pattern.fold_m * (0.35 + 0.65 * edge) * trouser_folds(seamed.template_m, rng)
     snug = _tucked_in(top, seamed)
     gap_m = 0.4 * hip * snug
-    cloth_m = draped(seamed, snug * ease_m, Drape(gap_m, np.maximum(hold, 0.5 * (1.0 - snug)), snug * fold_m))
+    how = Drape(gap_m, np.maximum(hold, 0.5 * (1.0 - snug)), snug * fold_m, np.zeros(len(gap_m)))
+    cloth_m = draped(seamed, snug * ease_m, how)
     folded = replace(seamed, vertices_m=cloth_m)
     weights = _onto(_eased_weights(seamed, 6), {"foot": ("ankle", 1.0), "ankle": ("knee", 0.75)})
     sewn = hemmed(replace(folded, weights=weights), field_m, _HEM_M, pattern.thickness_m)
