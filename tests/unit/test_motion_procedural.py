@@ -99,7 +99,7 @@ def test_a_sitter_rests_its_hips_on_the_seat_with_planted_feet_and_stands_up_aga
         assert np.linalg.norm(_joint(motion, f"{side}_wrist") - thigh_m, axis=1)[96] < 0.2, "hands rest on the thighs"
 
 
-@pytest.mark.parametrize(("seat_m", "last", "table"), [(0.44, 60, False), (0.75, 185, False), (0.44, 185, True)])
+@pytest.mark.parametrize(("seat_m", "last", "table"), [(0.44, 50, False), (0.75, 185, False), (0.44, 185, True)])
 def test_without_time_or_room_an_actor_stays_on_its_feet(seat_m: float, last: int, table: bool) -> None:
     things = [("chair", tri(box((0.5, 0.5, seat_m), (0.0, 0.0, 0.5 * seat_m))), False)]
     if table:

@@ -21,8 +21,8 @@ from perpetua.rooms.types import Room
 
 logger = logging.getLogger(__name__)
 
-DOWN_S, UP_S = 1.4, 1.3
-_SETTLE_S, _LEAST_REST_S, _BACK_STEP_MPS, _LEAST_BACK_S = 0.25, 0.6, 0.4, 0.6
+DOWN_S, UP_S = 1.2, 1.05
+_SETTLE_S, _LEAST_REST_S, _BACK_STEP_MPS, _LEAST_BACK_S = 0.14, 0.3, 0.45, 0.4
 # Flesh between the hip joints and the seat, in lengths of the thigh, where the body does not say.
 _FLESH_SHARE = 0.235
 # Under the thigh there is less of it, and a cushion gives way by so much.

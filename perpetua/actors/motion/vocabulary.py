@@ -85,7 +85,7 @@ _LOOK = "look glance gaze watch peer stare"
 _HAND = "hand put rest keep clasp hold"
 _DOWN, _UP, _IN, _AHEAD = (0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)
 _BACK = (-1.0, 0.0, 0.0)
-_HANDSET = HandPose((0.15, 0.02, 0.11), (-0.5, 0.3, -1.0), (-0.3, -1.0, 0.1), 0.0, "grip")
+_HANDSET = HandPose((0.22, 0.02, 0.15), (-0.5, 0.3, -1.0), (-0.3, -1.0, 0.1), 0.0, "grip")
 _SCREEN = HandPose((0.45, -0.24, -0.16), (-0.2, 0.45, -1.0), (-0.8, -0.2, 0.6), 0.1, "grip")
 _WAVE = HandPose(
     (0.30, 0.24, 0.30), (0.0, 0.8, -1.0), _AHEAD, 0.0, "flat", swing=(0.0, 0.10, 0.0), beat_rad=0.0, swing_hz=1.6
