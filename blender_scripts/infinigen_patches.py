@@ -3,6 +3,7 @@
 
 from collections import OrderedDict
 
+import bpy
 import numpy as np
 import trimesh
 from infinigen2.objects import boulder, random_primitives
@@ -83,7 +84,7 @@ Placed = tuple[trimesh.Trimesh, np.ndarray]
 
 def placed_colliders(colliders: collision.CollisionSet) -> list[Placed]:
     """The collision meshes of a set and where they stand (world from mesh, f64[4, 4])."""
-    collision.bpy.context.view_layer.update()
+    bpy.context.view_layer.update()
     items = [thing.item() for thing in colliders.objs]
     meshes = [colliders.mesh_colliders.get(id(item.data)) for item in items]
     placed = [np.asarray(item.matrix_world, np.float64) for item in items]
@@ -95,7 +96,7 @@ def joined_colliders(parts: list[Placed]) -> trimesh.Trimesh:
     return trimesh.util.concatenate([mesh.copy().apply_transform(matrix) for mesh, matrix in parts])
 
 
-def _floor_edges(wall: object) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+def _floor_edges(wall: bpy.types.Object) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     corners = [wall.matrix_world @ vertex.co for vertex in wall.data.vertices]
     # Walls reach a centimetre below the floor.
     points = [(round(corner.x, 3), round(corner.y, 3)) if corner.z < 0.1 else None for corner in corners]
