@@ -300,7 +300,7 @@ STAGES = (
     Stage(
         10,
         "room",
-        2,
+        3,
         (),
         _room_settings,
         _room,

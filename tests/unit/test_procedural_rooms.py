@@ -16,8 +16,7 @@ from perpetua.navigation.config import NavigationConfig
 from perpetua.rooms.acceptance import RoomRejected, check_room
 from perpetua.rooms.config import Daytime, RoomKind, RoomsConfig
 from perpetua.rooms.procedural import ProceduralRooms
-from perpetua.rooms.procedural.common_rules import SMALL_SIZES
-from perpetua.rooms.procedural.plan import Box, FloorPlan, RoomPlan
+from perpetua.rooms.procedural.plan import EXTRAS, Box, FloorPlan, RoomPlan
 from perpetua.rooms.procedural.sampling import sample_floor, sample_room
 from perpetua.rooms.source import RoomWish
 from perpetua.rooms.types import PATTERNS, Room
@@ -26,9 +25,6 @@ from perpetua.seeding import StageSeed
 CONFIG = RoomsConfig()
 KINDS: tuple[RoomKind, ...] = ("bathroom", "bedroom", "diningroom", "kitchen", "livingroom")
 SEEDS = range(4)
-# What comes on top of the furniture: small things, and what belongs to windows and ceiling.
-EXTRAS = frozenset(SMALL_SIZES) | {"plates", "monitor", "tv", "paper_roll", "curtain", "curtain_rod"}
-EXTRAS |= {"ceiling_lamp", "pendant"}
 SEATS = frozenset({"sofa", "armchair", "chair", "stool", "bench", "bed"})
 
 
@@ -133,6 +129,8 @@ def test_l_shape_is_the_rectangle_less_its_corner(corner: int) -> None:
     for number, wall in enumerate(floor.walls):
         assert wall.at(-0.5 * wall.length_m, 0.0) == pytest.approx(tuple(floor.corners_m[number]))
         assert wall.at(0.5 * wall.length_m, 0.0) == pytest.approx(tuple(floor.corners_m[(number + 1) % 6]))
+        spot = wall.at(0.3, 0.7)
+        assert (wall.along_m(spot), wall.off_m(spot)) == pytest.approx((0.3, 0.7))
         # A little into the room is inside, a little the other way is not.
         assert Outline(floor.corners_m).contains_point(wall.at(0.0, 0.01))
         assert not Outline(floor.corners_m).contains_point(wall.at(0.0, -0.01))

@@ -126,7 +126,7 @@ def lay_table(layout: Layout, table: Piece) -> None:
         straight = Piece("chair", chair.size_m, chair.position_m, chair.quarters, ())
         edge = _distance_to_table(straight, table)
         x, y = straight.to_world(0.0, edge + 0.02)
-        layout.try_add(layout.piece("plates", size, (x, y, top), straight.quarters), 0.005)
+        layout.put(layout.piece("plates", size, (x, y, top), straight.quarters))
     centre = ("vase", "bowl", "candles")[int(layout.rng.integers(3))]
     layout.on_top(table, centre, SMALL_SIZES[centre], 0.0, middle_y)
 

@@ -5,13 +5,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from perpetua.rooms.procedural.plan import DETAILS, RUG_THICKNESS_M, WALL_GAP_M, Box, FloorPlan, Opening, Piece, Spot
+from perpetua.rooms.procedural.plan import (
+    DETAILS,
+    EXTRAS,
+    MAX_FURNITURE,
+    RUG_THICKNESS_M,
+    WALL_GAP_M,
+    Box,
+    FloorPlan,
+    Opening,
+    Piece,
+    Spot,
+)
 
 Size = tuple[float, float, float]
 TRIES = 50
 DOOR_ZONE_M = 1.1
 # Between neighbours that are not meant to touch; wide enough not to look like a mistake.
 NEIGHBOUR_GAP_M = 0.06
+# What stands under a window ends this far below its sill, so that worktops with tiles behind them do not.
+SILL_MARGIN_M = 0.12
 
 
 class Layout:
@@ -23,7 +36,14 @@ class Layout:
         self.door = door
         self.windows = tuple(windows)
         self.pieces: list[Piece] = []
-        self._empty = [self._before(door, DOOR_ZONE_M)] + [self._before(window, 0.3) for window in windows]
+        # Space before openings, which stays empty at all heights of the opening, and space before furniture.
+        self._openings = [self._before(door, DOOR_ZONE_M)] + [self._before(window, 0.3) for window in windows]
+        self._fronts: list[Box] = []
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the room has as much furniture as it may."""
+        return sum(piece.category not in EXTRAS for piece in self.pieces) >= MAX_FURNITURE
 
     def between(self, low: float, high: float) -> float:
         """A number from a range."""
@@ -37,7 +57,8 @@ class Layout:
         half, wall = 0.5 * opening.width_m + 0.08, self.floor.walls[opening.wall]
         x0, y0 = wall.at(opening.middle_m - half, 0.0)
         x1, y1 = wall.at(opening.middle_m + half, depth_m)
-        return Box((min(x0, x1), min(y0, y1), opening.sill_m - 0.04), (max(x0, x1), max(y0, y1), opening.head_m + 0.08))
+        low_z_m, high_z_m = opening.sill_m - SILL_MARGIN_M, opening.head_m + 0.08
+        return Box((min(x0, x1), min(y0, y1), low_z_m), (max(x0, x1), max(y0, y1), high_z_m))
 
     def piece(self, category: str, size_m: Size, position_m: Size, quarters: int, skew_rad: float = 0.0) -> Piece:
         """A piece with details of its own, not placed yet."""
@@ -45,28 +66,37 @@ class Layout:
         return Piece(category, size_m, position_m, quarters % 4, detail, skew_rad)
 
     def fits(self, piece: Piece, front_m: float = 0.0, gap_m: float = NEIGHBOUR_GAP_M) -> bool:
-        """Whether the piece is inside the room, clear of other pieces, and blocks no door or window."""
-        box = piece.box()
-        if not self.floor.contains(box) or any(box.overlaps(empty) for empty in self._empty):
+        """Whether the piece is inside the room, clear of other pieces and their fronts, and blocks no opening."""
+        box, wide = piece.box(), piece.box(front_m)
+        if any(box.overlaps(front) for front in self._fronts) or not self._is_clear(box, gap_m):
             return False
-        wide = piece.box(front_m)
         # A rug may lie before a piece, but nothing may stand on its edge.
-        return not any((box if other.category == "rug" else wide).overlaps(other.box(), gap_m) for other in self.pieces)
+        return not any(wide.overlaps(other.box(), gap_m) for other in self.pieces if other.category != "rug")
+
+    def _is_clear(self, box: Box, gap_m: float) -> bool:
+        """Whether a box is inside the room, before no opening, and clear of all pieces."""
+        if not self.floor.contains(box) or any(box.overlaps(opening) for opening in self._openings):
+            return False
+        return not any(box.overlaps(other.box(), gap_m) for other in self.pieces)
 
     def add(self, piece: Piece, front_m: float = 0.0) -> Piece:
         """Places the piece; ``front_m`` before it stays empty from now on."""
         self.pieces.append(piece)
         if front_m > 0.0:
-            self._empty.append(piece.box(front_m))
+            self._fronts.append(piece.box(front_m))
         return piece
 
     def try_add(self, piece: Piece, gap_m: float = NEIGHBOUR_GAP_M) -> Piece | None:
         """Places the piece if it fits."""
         return self.add(piece) if self.fits(piece, gap_m=gap_m) else None
 
+    def put(self, thing: Piece) -> Piece | None:
+        """Places a small thing on furniture, where fronts do not count, if nothing else is in its way."""
+        return self.add(thing) if self._is_clear(thing.box(), 0.004) else None
+
     def keep_empty(self, box: Box) -> None:
         """Nothing is placed in this box from now on."""
-        self._empty.append(box)
+        self._openings.append(box)
 
     def at_wall(
         self,
@@ -78,7 +108,12 @@ class Layout:
         z_m: float = 0.0,
         off_m: float = WALL_GAP_M,
     ) -> Piece | None:
-        """A piece with its back to one of the walls, anywhere along it or in a corner; None if it fits nowhere."""
+        """A piece with its back to one of the walls, anywhere along it or in a corner.
+
+        None if it fits nowhere, or if the room has as much furniture as it may.
+        """
+        if self.is_full:
+            return None
         numbers = range(len(self.floor.walls)) if walls is None else walls
         long_enough = [number for number in numbers if self.floor.walls[number].length_m > size_m[0] + 2 * WALL_GAP_M]
         if not long_enough:
@@ -92,28 +127,28 @@ class Layout:
                 return self.add(candidate, front_m)
         return None
 
-    def facing(self, anchor: Piece, category: str, size_m: Size, front_m: float, reach_m: float = 4.6) -> Piece | None:
-        """A piece at a wall that ``anchor`` looks at, as nearly opposite its middle as fits; None if none does."""
-        middle = anchor.to_world(0.0, 0.5 * anchor.size_m[1])
-        found: list[tuple[float, Piece]] = []
-        for wall in self.floor.walls:
-            if wall.quarters != (anchor.quarters + 2) % 4:
-                continue
-            start = wall.at(-0.5 * wall.length_m, 0.0)
-            axis = 0 if wall.quarters % 2 == 0 else 1
-            sign = 1.0 if wall.quarters in (0, 1) else -1.0
-            best = sign * (middle[axis] - start[axis]) - 0.5 * wall.length_m
-            limit = 0.5 * (wall.length_m - size_m[0]) - WALL_GAP_M
-            for aside in (0.0, -0.3, 0.3, -0.6, 0.6):
-                place = wall.at(best + aside, WALL_GAP_M)
-                candidate = self.piece(category, size_m, (*place, 0.0), wall.quarters)
-                distance = abs(anchor.to_world(0.0, anchor.size_m[1])[1 - axis] - place[1 - axis])
-                ahead = (place[1 - axis] - middle[1 - axis]) * (1.0, -1.0)[anchor.quarters in (1, 2)] > 0.0
-                if abs(best + aside) <= limit and ahead and distance < reach_m and self.fits(candidate, front_m):
-                    found.append((distance + abs(aside), candidate))
-        if not found:
-            return None
-        return self.add(min(found, key=lambda entry: entry[0])[1], front_m)
+    def facing(self, anchor: Piece, category: str, size_m: Size, front_m: float, reach_m: float) -> Piece | None:
+        """A piece at a wall within reach that ``anchor`` looks at, opposite its middle or a little aside."""
+        for aside_m in (0.0, -0.3, 0.3, -0.6, 0.6):
+            for number in self._walls_ahead(anchor, reach_m):
+                wall = self.floor.walls[number]
+                along_m = wall.along_m(anchor.to_world(aside_m, 0.0))
+                if abs(along_m) > 0.5 * (wall.length_m - size_m[0]) - WALL_GAP_M:
+                    continue
+                candidate = self.piece(category, size_m, (*wall.at(along_m, WALL_GAP_M), 0.0), wall.quarters)
+                if self.fits(candidate, front_m):
+                    return self.add(candidate, front_m)
+        return None
+
+    def _walls_ahead(self, anchor: Piece, reach_m: float) -> list[int]:
+        """The walls that a piece looks at from within reach, the nearest first."""
+        front = anchor.to_world(0.0, anchor.size_m[1])
+        ahead = [
+            (wall.off_m(front), number)
+            for number, wall in enumerate(self.floor.walls)
+            if wall.quarters == (anchor.quarters + 2) % 4 and 0.0 < wall.off_m(front) < reach_m
+        ]
+        return [number for _, number in sorted(ahead)]
 
     def beside(
         self, anchor: Piece, category: str, size_m: Size, gap_m: float = 0.08, clear_m: float = NEIGHBOUR_GAP_M
@@ -174,13 +209,13 @@ class Layout:
         off = turn.to_world(0.0, 0.5 * size_m[1])
         x, y = surface.to_world(x_m, y_m)
         position = (x - off[0], y - off[1], surface.position_m[2] + surface.size_m[2])
-        return self.try_add(self.piece(category, size_m, position, surface.quarters, skew_rad), 0.004)
+        return self.put(self.piece(category, size_m, position, surface.quarters, skew_rad))
 
     def on_wall(self, anchor: Piece, category: str, size_m: Size, z_m: float, x_m: float = 0.0) -> Piece | None:
         """A thing on the wall behind a piece that stands at it; None where something is in the way."""
         x, y = anchor.to_world(x_m, -WALL_GAP_M)
         candidate = self.piece(category, size_m, (x, y, z_m), anchor.quarters)
-        return self.try_add(candidate, 0.03)
+        return None if self.is_full else self.try_add(candidate, 0.03)
 
     def rug(self, size_m: Spot, centre_m: Spot, quarters: int) -> Piece | None:
         """A rug: what stands wholly on it is lifted by its thickness; None if anything would stand on its edge."""

@@ -78,15 +78,34 @@ DARK_WOODS: tuple[tuple[Color, Color], ...] = (
     ((0.07, 0.060, 0.055), (0.032, 0.028, 0.025)),
 )
 CERAMIC: Color = (0.82, 0.82, 0.80)
+# Colours of cloth, paint and pottery that people live with, linear RGB.
+TONES: tuple[Color, ...] = (
+    (0.52, 0.22, 0.13),
+    (0.56, 0.36, 0.09),
+    (0.28, 0.36, 0.24),
+    (0.035, 0.07, 0.16),
+    (0.52, 0.30, 0.28),
+    (0.05, 0.21, 0.21),
+    (0.06, 0.06, 0.07),
+    (0.68, 0.62, 0.50),
+    (0.05, 0.14, 0.08),
+    (0.36, 0.12, 0.055),
+    (0.16, 0.22, 0.30),
+    (0.48, 0.39, 0.28),
+    (0.33, 0.45, 0.54),
+    (0.17, 0.07, 0.13),
+    (0.33, 0.33, 0.32),
+    (0.70, 0.69, 0.66),
+)
 
 
 def sample_palette(rng: np.random.Generator, kind: str, lamps_on: bool) -> Palette:
     """Draws the materials and the manner of a room of this kind."""
     hue = float(rng.uniform())
     wood, dark_wood = (_wood(name, woods, rng) for name, woods in (("wood", WOODS), ("dark wood", DARK_WOODS)))
-    cloth = _color(hue + rng.choice([0.0, 0.08, 0.5]), rng.uniform(0.12, 0.6), rng.uniform(0.12, 0.55))
-    other_cloth = _color(hue + rng.choice([0.1, 0.42, 0.58]), rng.uniform(0.25, 0.7), rng.uniform(0.2, 0.55))
-    lacquer = _color(hue + rng.uniform(-0.1, 0.1), rng.choice([0.03, 0.15, 0.4]), rng.uniform(0.35, 0.8))
+    tones = [_jittered(TONES[int(index)], rng) for index in rng.permutation(len(TONES))]
+    cloth, other_cloth = tones[0], tones[1]
+    lacquer = tones[2] if rng.uniform() < 0.6 else _jittered(TONES[-1], rng)
     stone = _color(rng.uniform(0.05, 0.15), 0.06, rng.choice([0.06, 0.45, 0.7]))
     wall, accent_wall = _walls(kind, hue, rng)
     return Palette(
@@ -104,9 +123,9 @@ def sample_palette(rng: np.random.Generator, kind: str, lamps_on: bool) -> Palet
         upholstery=_cloth("upholstery", cloth, rng),
         second_upholstery=_cloth("second upholstery", other_cloth, rng),
         linen=Material("linen", (0.74, 0.73, 0.70), (0.62, 0.61, 0.58), 0.95, pattern="fabric", scale_m=0.02),
-        blanket=_cloth("blanket", cloth if rng.uniform() < 0.5 else _shade(other_cloth, 1.2), rng),
-        rug=_rug(hue + 0.1 * rng.uniform(), rng),
-        curtain=_cloth("curtain", _shade(other_cloth, 1.3) if rng.uniform() < 0.6 else (0.70, 0.68, 0.63), rng),
+        blanket=_cloth("blanket", tones[3] if rng.uniform() < 0.5 else tones[1], rng),
+        rug=_rug((cloth, tones[3], tones[4]), rng),
+        curtain=_cloth("curtain", other_cloth if rng.uniform() < 0.5 else (0.66, 0.63, 0.57), rng),
         metal=Material("metal", (0.58, 0.57, 0.55), (0.46, 0.45, 0.44), 0.28, 1.0, "brushed", 0.05),
         warm_metal=Material("warm metal", (0.72, 0.50, 0.24), (0.62, 0.42, 0.2), 0.25, 1.0, "brushed", 0.05),
         black=Material("black", (0.018, 0.018, 0.02), roughness=0.22),
@@ -119,7 +138,7 @@ def sample_palette(rng: np.random.Generator, kind: str, lamps_on: bool) -> Palet
         soil=Material("soil", (0.05, 0.03, 0.02), (0.02, 0.013, 0.01), 1.0, pattern="terrazzo", scale_m=0.02),
         paper=Material("paper", (0.78, 0.75, 0.68), roughness=0.9),
         lamp_shade=Material("lamp shade", (0.95, 0.83, 0.64), roughness=0.9, emission_w_m2=14.0 if lamps_on else 0.0),
-        accents=tuple(_accent(f"accent {index}", hue + 0.2 * index, rng) for index in range(5)),
+        accents=tuple(_accent(f"accent {index}", tone, rng) for index, tone in enumerate(tones[1:6])),
         books=tuple(_book(f"book {index}", rng) for index in range(7)),
         pictures=tuple(_picture(f"picture {index}", hue, rng) for index in range(PICTURES)),
     )
@@ -146,6 +165,14 @@ def _color(hue: float, saturation: float, value: float) -> Color:
     return red, green, blue
 
 
+def _jittered(color: Color, rng: np.random.Generator) -> Color:
+    """A colour a little lighter or darker, warmer or cooler."""
+    red, green, blue = (
+        float(value) for value in np.array(color) * rng.uniform(0.85, 1.15) * rng.uniform(0.95, 1.05, 3)
+    )
+    return red, green, blue
+
+
 def _shade(color: Color, factor: float) -> Color:
     red, green, blue = (min(0.9, factor * channel) for channel in color)
     return red, green, blue
@@ -165,7 +192,7 @@ def _cloth(name: str, color: Color, rng: np.random.Generator) -> Material:
 def _walls(kind: str, hue: float, rng: np.random.Generator) -> tuple[Material, Material]:
     """Most walls of a room, and the one that differs."""
     plain = _color(hue + rng.uniform(-0.05, 0.05), rng.uniform(0.02, 0.16), rng.uniform(0.62, 0.85))
-    strong = _color(hue + rng.uniform(-0.1, 0.1), rng.uniform(0.2, 0.5), rng.uniform(0.16, 0.6))
+    strong = _jittered(TONES[int(rng.integers(len(TONES)))], rng)
     if kind == "bathroom":
         pattern = str(rng.choice(["tile", "bricks"]))
         tile_m = float(rng.choice([0.1, 0.15, 0.2]) if pattern == "tile" else rng.choice([0.075, 0.1, 0.15]))
@@ -207,21 +234,18 @@ def _splashback(hue: float, rng: np.random.Generator) -> Material:
     return Material("splashback", color, (0.55, 0.54, 0.52), 0.1, pattern=pattern, scale_m=0.1)
 
 
-def _rug(hue: float, rng: np.random.Generator) -> Material:
-    if rng.uniform() < 0.7:
-        return Material("rug", (0.5, 0.5, 0.5), roughness=1.0, scale_m=0.0, image=paint_rug(rng, hue))
-    color = _color(hue, rng.uniform(0.1, 0.5), rng.uniform(0.25, 0.65))
-    return Material("rug", color, _shade(color, 0.5), 1.0, pattern="fabric", scale_m=0.05)
+def _rug(tones: tuple[Color, Color, Color], rng: np.random.Generator) -> Material:
+    if rng.uniform() < 0.75:
+        return Material("rug", (0.5, 0.5, 0.5), roughness=1.0, scale_m=0.0, image=paint_rug(rng, np.array(tones)))
+    return Material("rug", tones[0], _shade(tones[0], 0.5), 1.0, pattern="fabric", scale_m=0.05)
 
 
-def _accent(name: str, hue: float, rng: np.random.Generator) -> Material:
-    color = _color(hue + rng.uniform(-0.07, 0.07), rng.uniform(0.3, 0.8), rng.uniform(0.2, 0.7))
-    return Material(name, color, roughness=float(rng.uniform(0.15, 0.7)))
+def _accent(name: str, tone: Color, rng: np.random.Generator) -> Material:
+    return Material(name, tone, roughness=float(rng.uniform(0.15, 0.7)))
 
 
 def _book(name: str, rng: np.random.Generator) -> Material:
-    color = _color(rng.uniform(), rng.uniform(0.1, 0.75), rng.uniform(0.08, 0.6))
-    return Material(name, color, roughness=0.6)
+    return Material(name, _jittered(TONES[int(rng.integers(len(TONES)))], rng), roughness=0.6)
 
 
 def _picture(name: str, hue: float, rng: np.random.Generator) -> Material:

@@ -15,6 +15,15 @@ SKIRTING_HEIGHT_M = 0.09
 SKIRTING_DEPTH_M = 0.014
 WALL_GAP_M = 0.02
 WALL_THICKNESS_M = 0.2
+# A room has at most this many pieces of furniture, not counting small things and what windows and ceilings carry.
+MAX_FURNITURE = 25
+EXTRAS = frozenset(
+    {
+        "books", "bottles", "bowl", "candles", "ceiling_lamp", "chopping_board", "cup", "curtain", "curtain_rod",
+        "kettle", "monitor", "paper_roll", "pendant", "photo", "plates", "small_plant", "soap", "table_lamp",
+        "towel_stack", "tray", "tv", "vase",
+    }
+)  # fmt: skip
 # Unit vectors of a quarter turn, exact: furniture must not tilt by rounding.
 QUARTER_TURNS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 
@@ -55,6 +64,16 @@ class Wall:
         cosine, sine = QUARTER_TURNS[self.quarters]
         x = along_m + 0.5 * self.length_m
         return self.start_m[0] + cosine * x - sine * off_m, self.start_m[1] + sine * x + cosine * off_m
+
+    def along_m(self, spot_m: Spot) -> float:
+        """How far along the wall from its middle a point lies."""
+        cosine, sine = QUARTER_TURNS[self.quarters]
+        return cosine * (spot_m[0] - self.start_m[0]) + sine * (spot_m[1] - self.start_m[1]) - 0.5 * self.length_m
+
+    def off_m(self, spot_m: Spot) -> float:
+        """How far into the room, off the wall's inner face, a point lies."""
+        cosine, sine = QUARTER_TURNS[self.quarters]
+        return cosine * (spot_m[1] - self.start_m[1]) - sine * (spot_m[0] - self.start_m[0])
 
 
 @dataclass(frozen=True)

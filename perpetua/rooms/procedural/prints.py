@@ -22,13 +22,14 @@ def paint_print(rng: np.random.Generator, hue: float) -> UInt8[np.ndarray, "H W 
     return _to_bytes(canvas)
 
 
-def paint_rug(rng: np.random.Generator, hue: float) -> UInt8[np.ndarray, "H W 3"]:
-    """A rug in sRGB: borders around a field of bands, diamonds, or plain wool."""
+def paint_rug(rng: np.random.Generator, tones: Float64[np.ndarray, "3 3"]) -> UInt8[np.ndarray, "H W 3"]:
+    """A rug in sRGB of three tones (linear RGB): borders around a field of bands, diamonds, or plain wool."""
     height, width = RUG_PX
     y, x = np.mgrid[0:height, 0:width].astype(np.float64)
     edge = np.minimum(np.minimum(x, width - 1 - x), np.minimum(y, height - 1 - y))
     u, v = np.abs(x - 0.5 * width + 0.5), np.abs(y - 0.5 * height + 0.5)
-    ground, second, third = (_color(hue + s, rng.uniform(0.15, 0.6), rng.uniform(0.3, 0.8)) for s in (0.0, 0.08, 0.5))
+    # Display gamma, near enough for wool.
+    ground, second, third = np.clip(tones, 0.0, 1.0) ** (1.0 / 2.2)
     canvas = np.broadcast_to(ground, (height, width, 3)).copy()
     manner = int(rng.integers(4))
     if manner == 0:

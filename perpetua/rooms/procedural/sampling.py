@@ -17,7 +17,7 @@ CORNER_M = 0.45
 LARGE_ROOM_M2 = 26.0
 CEILING_LAMP_M = 0.5
 # A corner is cut from this share of the rooms that stay this large.
-L_SHARE = 0.45
+L_SHARE = 0.4
 L_MIN_AREA_M2 = 20.0
 L_MIN_ARM_M = 2.7
 
@@ -138,21 +138,13 @@ def _lamp_spots(floor: FloorPlan) -> list[tuple[float, float]]:
     """The middle of a rectangle, or two places along it if it is large; of an L, the middles of its two arms."""
     low, high = floor.corners_m.min(0), floor.corners_m.max(0)
     if floor.notch is not None:
-        notch_low, notch_high = np.array(floor.notch.low_m[:2]), np.array(floor.notch.high_m[:2])
-        cut = notch_high - notch_low
-        # The corner opposite the notch belongs to both arms.
-        left = notch_low[0] <= low[0] + 1e-9
-        near = notch_low[1] <= low[1] + 1e-9
-        beside = ((high[0] if left else low[0]) + (notch_high[0] if left else notch_low[0])) / 2
-        across = ((high[1] if near else low[1]) + (notch_high[1] if near else notch_low[1])) / 2
-        middle = 0.5 * (notch_low + notch_high)
-        shift = 0.25 * (high - low - cut)
-        tall = (float(beside), float(0.5 * (middle[1] + (low[1] + high[1]) / 2)))
-        wide = (float(0.5 * (middle[0] + (low[0] + high[0]) / 2)), float(across))
-        return [tall, wide] if float(np.abs(shift).max()) > 0.0 else [tall]
-    width, depth = high - low
+        # Beside the notch, along each axis, lies an arm that runs the whole length of the other axis.
+        cut_low, cut_high = np.array(floor.notch.low_m[:2]), np.array(floor.notch.high_m[:2])
+        x, y = np.where(cut_low <= low, 0.5 * (cut_high + high), 0.5 * (low + cut_low))
+        return [(float(x), 0.0), (0.0, float(y))]
     if floor.area_m2 < LARGE_ROOM_M2:
         return [(0.0, 0.0)]
+    width, depth = high - low
     quarter = 0.25 * float(max(width, depth))
     return [(side * quarter, 0.0) if width >= depth else (0.0, side * quarter) for side in (-1.0, 1.0)]
 
