@@ -47,7 +47,7 @@ class MotionAudit:
     """Hard rules, and curves over the frames: distances hold the least of a frame's four sub-steps.
 
     ``views_seeing`` counts the views that see an actor; ``apart_rad`` is the angle at an actor between its two most
-    different views, over all of them.
+    different views, over all of them; ``focus_seen`` is 1 where a view sees one of the actors it is to show.
     """
 
     checks: tuple[Check, ...]
@@ -56,6 +56,7 @@ class MotionAudit:
     actor_apart_m: Float64[np.ndarray, "A T"]
     views_seeing: Float64[np.ndarray, "A T"]
     apart_rad: Float64[np.ndarray, "A T"]
+    focus_seen: Float64[np.ndarray, "C T"]
     camera_speed_mps: Float64[np.ndarray, "C T"]
     camera_turn_radps: Float64[np.ndarray, "C T"]
     camera_scene_m: Float64[np.ndarray, "C T"]
@@ -70,6 +71,7 @@ class MotionAudit:
         """Checks, summary and curves as JSON values, curves to a tenth of a millimetre or the like."""
         curves = {name: np.round(getattr(self, name), 4).tolist() for name in self.curve_names()}
         return {"passed": self.passed, "checks": [vars(check) for check in self.checks], "curves": curves} | {
+            "focus_seen_share": self.focus_seen.mean(axis=1).tolist(),
             "seen_by_two_share": (self.views_seeing >= 2).mean(axis=1).tolist(),
             "mean_apart_deg": float(np.degrees(self.apart_rad.mean())),
         }
@@ -85,6 +87,7 @@ def audit_motion(
     routes: tuple[Route, ...],
     actors: tuple[ActorMesh, ...],
     cameras: tuple[CameraPath, ...],
+    focus: Bool[np.ndarray, "C T A"],
     fps: float,
     limits: MotionLimits,
 ) -> MotionAudit:
@@ -95,6 +98,7 @@ def audit_motion(
         routes: where the actors' axes go.
         actors: their posed meshes, which cameras keep away from.
         cameras: one path per view.
+        focus: whom each view is to show.
         fps: frames per second.
         limits: the rules.
     """
@@ -109,6 +113,7 @@ def audit_motion(
         "actor_apart_m": _separation_m(axes_m),
         "views_seeing": seen.sum(axis=0).astype(np.float64),
         "apart_rad": _apart_rad(positions_m, axes_m),
+        "focus_seen": (np.moveaxis(seen, 1, 2) & focus).any(axis=2).astype(np.float64),
         "camera_speed_mps": _speed(positions_m, fps),
         "camera_turn_radps": np.stack([_turn_radps(path, fps) for path in cameras]),
         "camera_scene_m": camera_scene_m,

@@ -17,7 +17,7 @@ from perpetua.actors.types import ActorMesh, BodyMotion, Route
 from perpetua.actors.validation import validate_actors
 from perpetua.audit.motion_audit import MotionLimits, audit_motion
 from perpetua.audit.verify import verify_sequence
-from perpetua.cameras.plan import plan_cameras
+from perpetua.cameras.plan import CameraPlan, plan_cameras
 from perpetua.cameras.types import CameraPath
 from perpetua.config import Config
 from perpetua.errors import AuditError, CameraError
@@ -216,18 +216,19 @@ def _cameras(context: StageContext) -> tuple[CameraPath, ...]:
         context.seed,
     )
     write_json(context.folder / CAMERA_FIGURES, plan.to_json())
-    _require_kept_limits(context, plan.paths)
+    _require_kept_limits(context, plan)
     return plan.paths
 
 
-def _require_kept_limits(context: StageContext, cameras: tuple[CameraPath, ...]) -> None:
+def _require_kept_limits(context: StageContext, plan: CameraPlan) -> None:
     """Before anything is rendered, code that plans nothing measures what was planned."""
     config = context.config
     audit = audit_motion(
         context.one("room", Room),
         context.many("routes", Route),
         context.many("actors", ActorMesh),
-        cameras,
+        plan.paths,
+        plan.focus,
         config.sequence.fps,
         MotionLimits(config.actors.routes, config.cameras, config.navigation),
     )
@@ -322,7 +323,7 @@ STAGES = (
     Stage(
         60,
         "cameras",
-        3,
+        4,
         ("room", "routes", "actors"),
         _settings("cameras", "actors.routes", "navigation", _FRAMES, _FPS, "render.width_px", "render.height_px"),
         _cameras,

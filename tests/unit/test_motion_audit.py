@@ -19,7 +19,7 @@ from perpetua.navigation.config import NavigationConfig
 FPS = 24.0
 FRAMES = 9
 ROOM = camera_room()
-LIMITS = MotionLimits(RoutesConfig(), CamerasConfig(), NavigationConfig())
+LIMITS = MotionLimits(RoutesConfig(max_speed_mps=2.0), CamerasConfig(), NavigationConfig())
 BALL = as_tri_mesh(trimesh.creation.icosphere(subdivisions=4, radius=0.5))
 
 
@@ -63,7 +63,9 @@ def _cameras() -> tuple[CameraPath, ...]:
 def _audit(actors: tuple[ActorMesh, ...] | None = None, cameras: tuple[CameraPath, ...] | None = None) -> MotionAudit:
     actors = walkers(FRAMES) if actors is None else actors
     cameras = _cameras() if cameras is None else cameras
-    return audit_motion(ROOM, tuple(_route(actor) for actor in actors), actors, cameras, FPS / 6, LIMITS)
+    focus = np.zeros((len(cameras), FRAMES, len(actors)), bool)
+    focus[:, :, 0] = True
+    return audit_motion(ROOM, tuple(_route(actor) for actor in actors), actors, cameras, focus, FPS / 6, LIMITS)
 
 
 def _broken(audit: MotionAudit) -> list[str]:
@@ -79,6 +81,8 @@ def test_a_good_plan_passes_and_its_curves_are_true() -> None:
     assert audit.camera_speed_mps[0] == pytest.approx(np.full(FRAMES, 0.1 / (FRAMES - 1) * FPS / 6), rel=1e-6)
     assert audit.views_seeing.shape == audit.apart_rad.shape == (4, FRAMES)
     assert audit.views_seeing.max() == 2.0
+    # Only the first actor is asked for.
+    assert (audit.focus_seen.sum(axis=0) == audit.views_seeing[0]).all() and audit.focus_seen.max() == 1.0
 
 
 def test_a_wall_hides_and_the_image_ends() -> None:
