@@ -161,9 +161,9 @@ def test_one_mesh_is_parted_into_floor_and_rest(tmp_path: Path) -> None:
     # Floor, walls and ceiling of one unnamed mesh, seen from inside, with a block in it.
     import trimesh
 
-    shell = trimesh.creation.box(bounds=[[0, 0, 0], [6, 5, 2.7]])
+    shell = trimesh.creation.box(bounds=np.array([[0, 0, 0], [6, 5, 2.7]]))
     shell.invert()
-    block = trimesh.creation.box(bounds=[[1, 1, 0], [2, 2, 0.8]])
+    block = trimesh.creation.box(bounds=np.array([[1, 1, 0], [2, 2, 0.8]]))
     both = trimesh.util.concatenate([shell, block])
     both.apply_transform(Y_UP_FROM_Z_UP)
     trimesh.Scene({"scan": both}).export(str(tmp_path / "scene.glb"))
