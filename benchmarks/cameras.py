@@ -23,7 +23,7 @@ from perpetua.actors.types import ActorMesh
 from perpetua.cameras.config import CamerasConfig
 from perpetua.cameras.optimise import optimise_paths
 from perpetua.cameras.plan import CameraScene, Draft, camera_scene, draw_draft, make_paths, plan_cameras, pose_problem
-from perpetua.cameras.sdf import distance_at_m, voxel_centres_m
+from perpetua.cameras.sdf import distance_at_m, polygon_distance_m, voxel_centres_m
 from perpetua.cameras.types import CameraPath
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.transforms import look_at
@@ -146,8 +146,8 @@ def _field_error_m(scene: CameraScene) -> float:
         free_m[rng.integers(len(free_m), size=FIELD_POINTS)] + rng.uniform(-0.5, 0.5, (FIELD_POINTS, 3)) * field.voxel_m
     )
     exact_m = scene.caster.closest_distance(points_m)
-    low_m, high_m = scene.room.floor_polygon_m.min(axis=0), scene.room.floor_polygon_m.max(axis=0)
-    to_border_m = np.minimum(points_m[:, :2] - low_m, high_m - points_m[:, :2]).min(axis=1)
+    side_m = polygon_distance_m(scene.room.floor_polygon_m, points_m[:, :2])
+    to_border_m = np.minimum(side_m, np.minimum(points_m[:, 2], scene.room.height_m - points_m[:, 2]))
     inner = to_border_m > exact_m + field.voxel_m
     return float(np.abs(distance_at_m(field, points_m) - exact_m)[inner].max())
 

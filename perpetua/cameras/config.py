@@ -69,7 +69,7 @@ class CamerasConfig(Section):
         0.45, ge=0.0, le=1.0, description="least share of frames in which covering_views views see an actor"
     )
     min_apart_deg: float = Field(
-        45.0, ge=0.0, le=180.0, description="least mean angle between the two most different views of an actor, degrees"
+        40.0, ge=0.0, le=180.0, description="least mean angle between the two most different views of an actor, degrees"
     )
     candidates: int = Field(4, ge=1, le=64, description="sets of camera paths optimised; the best one wins")
     steps: int = Field(400, ge=0, le=10000, description="Adam steps; 0 keeps the starts")
