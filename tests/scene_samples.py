@@ -1,5 +1,6 @@
 """Scene files for tests, made of rooms of the procedural source."""
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,8 @@ Y_UP_FROM_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0
 def procedural_room(kind: RoomKind, room: int = 0) -> Room:
     """A furnished room of meshes and plain materials."""
     config = RoomsConfig(source="procedural", kinds=(kind,))
-    return build_room(config, NavigationConfig(), StageSeed(11, room, "room"), Path())
+    with tempfile.TemporaryDirectory() as scratch:
+        return build_room(config, NavigationConfig(), StageSeed(11, room, "room"), Path(scratch))
 
 
 def write_scene(room: Room, path: Path, world_from_file: np.ndarray = Y_UP_FROM_Z_UP) -> Path:
