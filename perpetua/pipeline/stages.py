@@ -312,7 +312,7 @@ STAGES = (
     Stage(
         30,
         "routes",
-        3,
+        4,
         ("room", "navigation"),
         _route_settings,
         _routes,
