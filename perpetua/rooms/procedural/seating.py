@@ -13,6 +13,7 @@ from perpetua.rooms.types import Material
 
 SEAT_M = 0.44
 SEAT_SIDE_M = 0.72
+FOOT_M, FOOT_INSET_M = 0.05, 0.05
 
 
 def build_sofa(piece: Piece, palette: Palette) -> list[Part]:
@@ -21,7 +22,8 @@ def build_sofa(piece: Piece, palette: Palette) -> list[Part]:
     arm, foot = 0.13 + 0.09 * piece.detail[0], 0.09 + 0.05 * piece.detail[3]
     places = max(1, round((width - 2 * arm) / SEAT_SIDE_M))
     half = 0.5 * width
-    seat = [_sofa_frame(piece, arm, foot)]
+    # Dowels run down inside the feet, so that the frame stands on the floor through them.
+    seat = [_sofa_frame(piece, arm, foot), _dowels(width, depth, foot)]
     pitch = (width - 2 * arm) / places
     for place in range(places):
         x0 = -half + arm + place * pitch + 0.004
@@ -34,12 +36,18 @@ def build_sofa(piece: Piece, palette: Palette) -> list[Part]:
         Part("", join(seat), cloth),
         Part(
             "feet",
-            legs(palette.style, width, depth, foot + 0.005, 0.05, 0.05),
+            legs(palette.style, width, depth, foot + 0.005, FOOT_M, FOOT_INSET_M),
             leg_material(palette, palette.dark_wood),
         ),
     ]
     throws = places > 1 or piece.detail[4] < 0.5
     return parts + (_throw_pillows(piece, arm, places, palette) if throws else [])
+
+
+def _dowels(width: float, depth: float, foot: float) -> TriMesh:
+    x, off = 0.5 * width - FOOT_INSET_M - 0.5 * FOOT_M, FOOT_INSET_M + 0.5 * FOOT_M
+    places = [(side * x, y) for side in (-1.0, 1.0) for y in (off, depth - off)]
+    return join([post(place, 0.006, 0.004, foot + 0.01, 6) for place in places])
 
 
 def _sofa_frame(piece: Piece, arm_m: float, foot_m: float) -> TriMesh:
