@@ -151,10 +151,12 @@ def verify(folders: tuple[Path, ...], deep: bool, frames: int, as_json: bool) ->
               help="Instead of a sequence, a page of a seed's first N rooms, from above and from corners.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
               help="With --actors or --rooms: their seed.")  # fmt: skip
-@click.option("--config", "config_path", type=click.Path(path_type=Path), help="With --rooms: a YAML file.")
+@click.option("--config", "config_path", type=click.Path(path_type=Path), help="With --actors or --rooms: a YAML file.")
 @click.option("--preset", metavar="NAME", default="standard", show_default=True,
-              help="With --rooms: settings to start from.")  # fmt: skip
-@click.option("--set", "assignments", metavar="KEY=VALUE", multiple=True, help="With --rooms: change one setting.")
+              help="With --actors or --rooms: settings to start from.")  # fmt: skip
+@click.option(
+    "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="With --actors or --rooms: change one setting."
+)
 @click.option("--device", type=click.Choice(DEVICES), default="auto", show_default=True, help="What Cycles renders on.")
 def preview(
     sequence: Path | None,
@@ -194,7 +196,7 @@ def preview(
         if picture is not None and picture.suffix.lower() not in PICTURE_SUFFIXES:
             raise InputError(f"a picture must end in {' or '.join(PICTURE_SUFFIXES)}, not '{picture.name}'")
     if actors is not None:
-        write_actor_sheet(actors, seed, load_config(), "auto", target)
+        write_actor_sheet(actors, seed, load_config(preset, config_path, assignments), device, target)
     elif sequence is not None:
         write_contact_sheet(sequence, target, times)
     click.echo(f"wrote {target}")

