@@ -13,8 +13,6 @@ from perpetua.seeding import StageSeed
 
 # What is sat on: so far behind the hip joints, along this share of the thighs, and so far to either side.
 _BUTTOCK_M, _THIGH_SHARE, _HALF_WIDTH_M = 0.08, 0.7, 0.22
-# Loose cloth that hangs lower than flesh can be is pressed flat.
-_SEAT_LIMITS_M = (0.06, 0.14)
 
 
 def draw_bodies(config: ActorsConfig, seed: StageSeed) -> tuple[Body, ...]:
@@ -46,7 +44,7 @@ def _seat_m(body: Body) -> float:
     under = (from_hip_m[:, 0] > -_BUTTOCK_M) & (from_hip_m[:, 0] < _THIGH_SHARE * thigh_m)
     near = np.abs(posed[:, 1]) < _HALF_WIDTH_M
     # Shins and feet, which hang at the knees, are not sat on.
-    return float(np.clip(-np.percentile(from_hip_m[under & near, 2], 0.5), *_SEAT_LIMITS_M))
+    return float(-np.percentile(from_hip_m[under & near, 2], 0.5))
 
 
 def assemble_actors(

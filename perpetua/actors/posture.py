@@ -1,9 +1,7 @@
 """Whether joints bend as people's do, and whether hands go into the trunk they belong to."""
 
-from itertools import pairwise
-
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float64, Int64
 from scipy.spatial.transform import Rotation
 
 from perpetua.actors.motion.kinematics import joint_index
@@ -19,6 +17,8 @@ _MOST_NECK_RAD, _MOST_HIP_RAD = 1.75, 2.45
 # Axis about which a knee and an elbow bend, in the rest pose; left elbows bend the other way than right ones.
 _KNEE_AXIS, _ELBOW_AXIS = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, -1.0])
 _TRUNK_JOINTS = ("spine1", "spine2", "spine3", "neck", "left_hip", "right_hip", "left_collar", "right_collar")
+# A point is inside where the trunk is met, no farther than this, in nearly every level direction.
+_DIRECTIONS, _ENCLOSING, _WIDTH_M = 12, 11, 0.4
 _HAND_JOINTS = ("left_wrist", "right_wrist")
 
 
@@ -62,23 +62,19 @@ def _bend_rad(motion: BodyMotion, parent: str, joint: str, axis: Float64[np.ndar
     return np.asarray((angle_rad + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-def hands_in_trunk(
-    actor: ActorMesh, joint_m: Float64[np.ndarray, "T 22 3"], probe: Probe, frames: Int64[np.ndarray, " K"]
-) -> Worst:
+def hands_in_trunk(actor: ActorMesh, probe: Probe, frames: Int64[np.ndarray, " K"]) -> Worst:
     """The deepest vertex of a hand in its owner's trunk; ``probe`` holds all vertices of the actor.
 
-    A hand's vertex is inside where nothing of the trunk's surface lies between it and the spine.
+    A hand's vertex is inside where the trunk is met in nearly all level directions from it.
     """
     hands = np.flatnonzero(np.isin(probe.bone_of, bones_ending_at(_HAND_JOINTS)))[::4]
     trunk = np.isin(probe.bone_of, bones_ending_at(_TRUNK_JOINTS))
     faces = actor.faces[trunk[np.searchsorted(probe.vertices, actor.faces)].all(axis=1)]
-    spine = [joint_index(name) for name in ("pelvis", "spine2", "spine3", "neck")]
     worst = Worst(0.0, 0, "nothing")
     for frame in frames:
         surface = Caster(TriMesh(actor.vertices_m[frame].astype(np.float64), faces))
         hand_m = actor.vertices_m[frame, probe.vertices[hands]].astype(np.float64)
-        near_m = _nearest_on_line(hand_m, joint_m[frame, spine])
-        inside = surface.clear(near_m, hand_m) & (np.linalg.norm(hand_m - near_m, axis=1) < 0.35)
+        inside = _enclosed(surface, hand_m)
         if inside.any():
             depth_m = float(surface.closest_distance(hand_m[inside]).max())
             if depth_m > worst.value_m:
@@ -86,15 +82,9 @@ def hands_in_trunk(
     return worst
 
 
-def _nearest_on_line(
-    points_m: Float64[np.ndarray, "N 3"], line_m: Float64[np.ndarray, "L 3"]
-) -> Float64[np.ndarray, "N 3"]:
-    """The nearest point of a polyline to each point."""
-    best_m = np.tile(line_m[0], (len(points_m), 1))
-    for start_m, end_m in pairwise(line_m):
-        along_m = end_m - start_m
-        share = np.clip((points_m - start_m) @ along_m / max(float(along_m @ along_m), 1e-12), 0.0, 1.0)
-        candidate_m = start_m + share[:, None] * along_m
-        closer = np.linalg.norm(points_m - candidate_m, axis=1) < np.linalg.norm(points_m - best_m, axis=1)
-        best_m = np.where(closer[:, None], candidate_m, best_m)
-    return best_m
+def _enclosed(surface: Caster, points_m: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+    turns_rad = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    level = np.stack([np.cos(turns_rad), np.sin(turns_rad), np.zeros(_DIRECTIONS)], axis=1)
+    origins_m, directions = np.repeat(points_m, _DIRECTIONS, axis=0), np.tile(level, (len(points_m), 1))
+    met = surface.first_hit(origins_m, directions).distance_m.reshape(-1, _DIRECTIONS) < _WIDTH_M
+    return np.asarray(met.sum(axis=1) >= _ENCLOSING)

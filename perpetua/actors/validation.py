@@ -31,7 +31,7 @@ _SOLE_RADIUS_M, _SOLE_THICKNESS_M = 0.06, 0.025
 # Bodies whose checked vertices come this near are tested for overlap.
 _TOUCH_M = 0.06
 # Hands are looked at in so many frames.
-_HAND_FRAMES = 16
+_HAND_FRAMES = 10
 # Floor is looked for from this far above the route.
 _FLOOR_SEARCH_M = 0.3
 
@@ -223,7 +223,7 @@ def _figures(
         _path_error(person),
         excess_rad,
         f"{joint} at frame {frame}",
-        hands_in_trunk(person.actor, person.joint_m, whole, few),
+        hands_in_trunk(person.actor, whole, few),
     )
 
 

@@ -60,11 +60,11 @@ def test_a_hand_in_the_trunk_is_measured() -> None:
     joint_m = joint_positions(motion, SKELETON)
     frames = np.arange(0, 40, 8)
     probe = make_probe(mesh, joint_m, frames, mesh.vertices_m.shape[1])
-    assert hands_in_trunk(mesh, joint_m, probe, frames).value_m == 0.0
+    assert hands_in_trunk(mesh, probe, frames).value_m == 0.0
     hand = np.isin(probe.bone_of, bones_ending_at(("left_wrist",)))
     vertices_m = mesh.vertices_m.copy()
     # The trunk's tubes are 5 cm thick.
     middle_m = 0.5 * (joint_m[16, joint_index("spine2")] + joint_m[16, joint_index("spine1")])
     vertices_m[16, hand] = middle_m + np.array([0.0, 0.02, 0.0])
-    worst = hands_in_trunk(replace(mesh, vertices_m=vertices_m), joint_m, probe, frames)
+    worst = hands_in_trunk(replace(mesh, vertices_m=vertices_m), probe, frames)
     assert worst.frame == 16 and 0.015 < worst.value_m < 0.05

@@ -27,8 +27,12 @@ _SETTLE_S, _LEAST_REST_S, _BACK_STEP_MPS, _LEAST_BACK_S = 0.14, 0.3, 0.45, 0.4
 _FLESH_SHARE = 0.235
 # Under the thigh there is less of it, and a cushion gives way by so much.
 _THIGH_SHARE, _GIVE_M = 0.85, 0.003
+# Skirts that hang lower than this would hang through the seat.
+_MOST_FLESH_M = 0.125
 # From the hip joints back to the back of the body, and from ankle to heel with a little room.
 _BACK_FLESH_M, _HEEL_M = 0.16, 0.11
+# Where the surface is looked at, and how much higher than in its middle it may be.
+_UNDER_AHEAD_M, _UNDER_ASIDE_M, _UNEVEN_M = np.linspace(-0.08, 0.2, 8), np.linspace(-0.16, 0.16, 7), 0.05
 # The front of knees, shins and toes: ahead of the ankle, and above the floor; to either side; and the room they need.
 _LEG_FRONT_M, _LEG_ASIDE_M, _LEG_ROOM_M = ((0.05, 0.45), (0.08, 0.25), (0.16, 0.08)), 0.13, 0.05
 # Heels rise at most this far from the floor on a high seat, radians.
@@ -210,6 +214,7 @@ def _ahead(facing_rad: float) -> Float64[np.ndarray, "2"]:
 
 def _look_at_seat(middle_m: Float64[np.ndarray, "3"], facing_rad: float, floor_m: float, caster: Caster) -> _Seat:
     ahead = np.append(_ahead(facing_rad), 0.0)
+    middle_m = np.array([middle_m[0], middle_m[1], _highest_m(middle_m, ahead, caster)])
     steps_m = np.arange(0.04, 0.7, 0.01)
     from_m = middle_m + np.array([0.0, 0.0, 0.12]) + steps_m[:, None] * ahead
     depth_m = caster.first_hit(from_m, np.tile([0.0, 0.0, -1.0], (len(from_m), 1))).distance_m
@@ -223,11 +228,22 @@ def _look_at_seat(middle_m: Float64[np.ndarray, "3"], facing_rad: float, floor_m
     return _Seat(middle_m, facing_rad, floor_m, edge_m, backs)
 
 
+def _highest_m(middle_m: Float64[np.ndarray, "3"], ahead: Float64[np.ndarray, "3"], caster: Caster) -> float:
+    """The height of the surface under the hips and thighs where it is highest: beds have folds."""
+    left = np.array([-ahead[1], ahead[0], 0.0])
+    forward_m, aside_m = (grid.reshape(-1, 1) for grid in np.meshgrid(_UNDER_AHEAD_M, _UNDER_ASIDE_M))
+    from_m = middle_m + forward_m * ahead + aside_m * left + np.array([0.0, 0.0, _UNEVEN_M])
+    depth_m = caster.first_hit(from_m, np.tile([0.0, 0.0, -1.0], (len(from_m), 1))).distance_m
+    return float(middle_m[2] + max(_UNEVEN_M - depth_m.min(), 0.0))
+
+
 def _settle(seat: _Seat, standing_m: float, skeleton: Skeleton) -> tuple[Float64[np.ndarray, "3"], float, float] | None:
     """Where the hips come to rest, how far the ankles are ahead of them, and how far heels are raised."""
     leg, foot = leg_of(skeleton, "left"), foot_of(skeleton, "left")
     thigh_m, shin_m = float(np.linalg.norm(leg.thigh_m)), float(np.linalg.norm(leg.shin_m))
     flesh_m = (_FLESH_SHARE * thigh_m if skeleton.seat_m is None else skeleton.seat_m) - _GIVE_M
+    if flesh_m > _MOST_FLESH_M:
+        return None
     nearest_back_m = min(distance_m for _, distance_m in seat.backs)
     best: tuple[float, float, float, float] | None = None
     for shift_m in np.arange(max(0.0, _BACK_FLESH_M - nearest_back_m), max(seat.edge_m - 0.09, 0.01), 0.02):

@@ -83,7 +83,7 @@ def _both(pose: HandPose) -> tuple[HandPose, HandPose]:
 
 _LOOK = "look glance gaze watch peer stare"
 _HAND = "hand put rest keep clasp hold"
-_DOWN, _UP, _IN, _AHEAD = (0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)
+_UP, _IN, _AHEAD = (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)
 _BACK = (-1.0, 0.0, 0.0)
 _HANDSET = HandPose((0.22, 0.02, 0.15), (-0.5, 0.3, -1.0), (-0.3, -1.0, 0.1), 0.0, "grip")
 _SCREEN = HandPose((0.45, -0.24, -0.16), (-0.2, 0.45, -1.0), (-0.8, -0.2, 0.6), 0.1, "grip")
@@ -113,8 +113,6 @@ _IN_FRONT = (
 _POCKET = HandPose((0.05, 0.08, -0.86), (-0.8, 0.8, 0.0), _IN, 0.0, "fist")
 _CHEST_CUP = HandPose((0.46, -0.10, -0.44), (-0.3, 0.5, -1.0), _IN, 0.0, "grip")
 _MOUTH = HandPose((0.40, -0.26, 0.14), (0.2, 0.7, -1.0), (-0.5, -1.0, 0.0), 0.2, "grip")
-_OVERHEAD = HandPose((0.05, 0.14, 0.96), (0.0, 1.0, 0.2), _IN)
-_PRAYER = HandPose((0.50, -0.26, -0.30), (-0.3, 0.8, -1.0), _IN, 0.0, "flat")
 
 ACTIONS: dict[str, Action] = {
     "talk on the phone": Action(
