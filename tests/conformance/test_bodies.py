@@ -1,6 +1,14 @@
-"""What every body model must keep: one suite over the registry."""
+"""What every body model must keep: one suite over the registry.
 
+A model that needs files has a module of its name in ``body_setups`` with ``actors_config(folder)``, which makes them
+in ``folder`` and returns the config that uses them.
+"""
+
+import importlib.util
+import tempfile
+from collections.abc import Iterator
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,16 +17,41 @@ from perpetua.actors.bodies import BODY_MODELS
 from perpetua.actors.bodies.source import Body
 from perpetua.actors.config import ActorsConfig
 from perpetua.actors.types import BODY_JOINTS, BODY_PARENTS, BodyMotion
+from perpetua.assets import ASSET_FOLDER_VARIABLE
 from perpetua.seeding import StageSeed
 
-CONFIG = ActorsConfig()
 SEED = StageSeed(seed=3, room=1, stage="actors")
 MODELS = sorted(BODY_MODELS)
+SETUPS = Path(__file__).parent / "body_setups"
+CONFIGS: dict[str, ActorsConfig] = {}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _configs() -> Iterator[None]:
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setenv(ASSET_FOLDER_VARIABLE, str(Path(folder) / "assets"))
+        for model in MODELS:
+            CONFIGS[model] = _sample_config(model, Path(folder) / model)
+        yield
+
+
+def _sample_config(model: str, folder: Path) -> ActorsConfig:
+    setup = SETUPS / f"{model}.py"
+    if not setup.exists():
+        return ActorsConfig(body=model)
+    folder.mkdir()
+    spec = importlib.util.spec_from_file_location(f"body_setup_{model}", setup)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    config = module.actors_config(folder)
+    assert isinstance(config, ActorsConfig) and config.body == model
+    return config
 
 
 @lru_cache(maxsize=8)
 def body(model: str, actor: int) -> Body:
-    return BODY_MODELS[model]().draw(actor, CONFIG, SEED)
+    return BODY_MODELS[model]().draw(actor, CONFIGS[model], SEED)
 
 
 def still(person: Body, world_from_joint: np.ndarray, pelvis_m: np.ndarray) -> BodyMotion:
@@ -41,7 +74,7 @@ def joint(name: str) -> int:
 
 @pytest.mark.parametrize("model", MODELS)
 def test_the_same_arguments_give_the_same_bits(model: str) -> None:
-    first, again = body(model, 0), BODY_MODELS[model]().draw(0, CONFIG, SEED)
+    first, again = body(model, 0), BODY_MODELS[model]().draw(0, CONFIGS[model], SEED)
     assert again.description == first.description
     assert again.pose(t_pose(again)).tobytes() == first.pose(t_pose(first)).tobytes()
     for one, two in zip(first.parts, again.parts, strict=True):
