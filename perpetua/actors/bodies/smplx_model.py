@@ -110,41 +110,45 @@ def load_model(path: Path, betas: int) -> SmplxModel:
         AssetError: the file is missing, is not SMPL-X's, needs pickle to be opened, or has too few directions.
     """
     try:
-        opened = np.load(path, allow_pickle=False)
+        # Given as a stream, the file is closed whatever is wrong with it.
+        with path.open("rb") as stream:
+            opened = np.load(stream, allow_pickle=False)
+            if not isinstance(opened, np.lib.npyio.NpzFile):
+                raise AssetError(f"SMPL-X model file '{path}' must be an .npz archive: download it again")
+            return _read(path, opened, betas)
     except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
         raise AssetError(
             f"SMPL-X model file '{path}' must be an .npz file that opens without pickle: {error}; get it from "
             "https://smpl-x.is.tue.mpg.de and set actors.smplx.folder to its folder"
         ) from None
-    if not isinstance(opened, np.lib.npyio.NpzFile):
-        raise AssetError(f"SMPL-X model file '{path}' must be an .npz archive: download it again")
-    with opened as file:
-        shapes = _shaped(path, "shapedirs", _array(path, file, "shapedirs"), (VERTEX_COUNT, 3, None))
-        _check_betas(path, shapes.shape[2], betas)
-        _check_tree(path, _array(path, file, "kintree_table"))
-        poses = _shaped(path, "posedirs", _array(path, file, "posedirs"), (VERTEX_COUNT, 3, 9 * (JOINT_COUNT - 1)))
-        plain = {
-            key: _shaped(path, key, _array(path, file, key), shape).astype(np.float32)
-            for key, shape in (
-                ("v_template", (VERTEX_COUNT, 3)),
-                ("J_regressor", (JOINT_COUNT, VERTEX_COUNT)),
-                ("weights", (VERTEX_COUNT, JOINT_COUNT)),
-            )
-        }
-        textured = "vt" in file and "ft" in file
-        uv = _shaped(path, "vt", _array(path, file, "vt"), (None, 2)).astype(np.float32) if textured else None
-        uv_faces = _indices(path, "ft", _array(path, file, "ft"), len(uv)) if uv is not None else None
-        return SmplxModel(
-            path,
-            plain["v_template"],
-            shapes[:, :, :betas].astype(np.float32),
-            np.ascontiguousarray(poses.reshape(3 * VERTEX_COUNT, -1).T.astype(np.float32)),
-            plain["J_regressor"],
-            plain["weights"],
-            _indices(path, "f", _array(path, file, "f"), VERTEX_COUNT),
-            uv,
-            uv_faces,
+
+
+def _read(path: Path, file: np.lib.npyio.NpzFile, betas: int) -> SmplxModel:
+    shapes = _shaped(path, "shapedirs", _array(path, file, "shapedirs"), (VERTEX_COUNT, 3, None))
+    _check_betas(path, shapes.shape[2], betas)
+    _check_tree(path, _array(path, file, "kintree_table"))
+    poses = _shaped(path, "posedirs", _array(path, file, "posedirs"), (VERTEX_COUNT, 3, 9 * (JOINT_COUNT - 1)))
+    plain = {
+        key: _shaped(path, key, _array(path, file, key), shape).astype(np.float32)
+        for key, shape in (
+            ("v_template", (VERTEX_COUNT, 3)),
+            ("J_regressor", (JOINT_COUNT, VERTEX_COUNT)),
+            ("weights", (VERTEX_COUNT, JOINT_COUNT)),
         )
+    }
+    textured = "vt" in file and "ft" in file
+    uv = _shaped(path, "vt", _array(path, file, "vt"), (None, 2)).astype(np.float32) if textured else None
+    return SmplxModel(
+        path,
+        plain["v_template"],
+        shapes[:, :, :betas].astype(np.float32),
+        np.ascontiguousarray(poses.reshape(3 * VERTEX_COUNT, -1).T.astype(np.float32)),
+        plain["J_regressor"],
+        plain["weights"],
+        _indices(path, "f", _array(path, file, "f"), VERTEX_COUNT),
+        uv,
+        _indices(path, "ft", _array(path, file, "ft"), len(uv)) if uv is not None else None,
+    )
 
 
 def in_our_axes(vectors: Float64[np.ndarray, "*shape 3"]) -> Float64[np.ndarray, "*shape 3"]:
