@@ -20,6 +20,14 @@ def asset_folder() -> Path:
     return Path(chosen) if chosen else Path.home() / ".local" / "share" / "perpetua" / "assets"
 
 
+def file_listing(folder: Path) -> list[str]:
+    """Name, size and time of change of all files of a folder, which stand for its content; empty without a folder."""
+    if not folder.is_dir():
+        return []
+    stats = {path.relative_to(folder).as_posix(): path.stat() for path in folder.rglob("*") if path.is_file()}
+    return [f"{name} {stat.st_size} {stat.st_mtime_ns}" for name, stat in sorted(stats.items())]
+
+
 @dataclass(frozen=True)
 class Asset:
     """One entry of the manifest: a Python ``package``, a ``program`` on PATH, or ``files`` below the asset folder."""

@@ -97,13 +97,18 @@ class SmplxBodies:
         return SmplxBody(words, _skeleton(model, vertices_m), parts, model, vertices_m, ends, share)
 
 
+def models_folder(config: SmplxConfig) -> Path:
+    """The folder of model files: the one that the config names, else ``smplx`` in the asset folder."""
+    return Path(config.folder).expanduser() if config.folder else asset_folder() / "smplx"
+
+
 def model_file(config: SmplxConfig, female: bool) -> Path:
     """The file of the person's sex, else the neutral one.
 
     Raises:
         AssetError: neither is there.
     """
-    folder = Path(config.folder).expanduser() if config.folder else asset_folder() / "smplx"
+    folder = models_folder(config)
     for name in (_FILES[female], _NEUTRAL):
         if (folder / name).is_file():
             return folder / name

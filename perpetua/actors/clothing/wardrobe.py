@@ -10,7 +10,7 @@ import numpy as np
 from perpetua.actors.bodies.makehuman import base_mesh
 from perpetua.actors.clothing.mhclo import Binding, read_binding
 from perpetua.actors.clothing.mhmat import MaterialFile, read_material
-from perpetua.assets import asset_folder
+from perpetua.assets import asset_folder, file_listing
 from perpetua.errors import AssetError
 
 # Heights on the base mesh by which garments are told apart: the chest, the thighs, the top of boots, the neck.
@@ -59,14 +59,6 @@ class Wardrobe:
 def clothes_folder(folder: str) -> Path:
     """The folder of MakeHuman assets: the one that the config names, else ``makehuman`` in the asset folder."""
     return Path(folder).expanduser() if folder else asset_folder() / "makehuman"
-
-
-def file_listing(folder: Path) -> list[str]:
-    """Name, size and time of change of all files of a folder; empty where there is none."""
-    if not folder.is_dir():
-        return []
-    stats = {path.relative_to(folder).as_posix(): path.stat() for path in folder.rglob("*") if path.is_file()}
-    return [f"{name} {stat.st_size} {stat.st_mtime_ns}" for name, stat in sorted(stats.items())]
 
 
 def words_of(*texts: str) -> set[str]:

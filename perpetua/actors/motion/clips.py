@@ -14,7 +14,7 @@ from perpetua.actors.motion.recorded.ride import MARGIN_S, Going, going_along, m
 from perpetua.actors.motion.recorded.tape import Tape, make_tape
 from perpetua.actors.motion.source import MOTION_SOURCES
 from perpetua.actors.types import BodyMotion, Route, Skeleton
-from perpetua.assets import asset_folder
+from perpetua.assets import asset_folder, file_listing
 from perpetua.errors import AssetError
 from perpetua.rooms.types import Room
 from perpetua.seeding import StageSeed
@@ -73,11 +73,7 @@ def clip_folder(config: ClipsConfig) -> Path:
 
 def clip_listing(config: MotionConfig) -> list[str]:
     """Name, size and time of change of all that the source may read; empty for other sources or without a folder."""
-    folder = clip_folder(config.clips)
-    if config.source != "clips" or not folder.is_dir():
-        return []
-    stats = {path.relative_to(folder).as_posix(): path.stat() for path in folder.rglob("*") if path.is_file()}
-    return [f"{name} {stat.st_size} {stat.st_mtime_ns}" for name, stat in sorted(stats.items())]
+    return file_listing(clip_folder(config.clips)) if config.source == "clips" else []
 
 
 def _choose(route: Route, going: Going, skeleton: Skeleton, config: ClipsConfig, rng: np.random.Generator) -> _Chosen:
