@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from perpetua.actors.assembly import assemble_actors, draw_bodies, measured_skeletons
 from perpetua.actors.bodies.source import Body
+from perpetua.actors.bodies.user_files import body_listing
 from perpetua.actors.casting import action_descriptions
 from perpetua.actors.config import ActorsConfig
 from perpetua.actors.motion.clips import clip_listing
@@ -22,7 +23,8 @@ from perpetua.cameras.types import CameraPath
 from perpetua.config import Config
 from perpetua.errors import AuditError, CameraError
 from perpetua.files import read_json, write_json
-from perpetua.formats import EXPORTERS, layout
+from perpetua.formats import layout
+from perpetua.formats.tapvid_mv import write_sequence
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
 from perpetua.pipeline.config import RedrawConfig
@@ -174,9 +176,14 @@ def _route_settings(config: Config) -> dict[str, Any]:
     return {**_settings("actors.count", "actors.routes", _FRAMES, _FPS)(config), "descriptions": descriptions}
 
 
+def _body_settings(config: Config) -> dict[str, Any]:
+    """Folders of clothes and of body models count by what is in them."""
+    return {**_settings("actors", _FPS)(config), "bodies": body_listing(config.actors)}
+
+
 def _motion_settings(config: Config) -> dict[str, Any]:
     """A folder of clips counts by what is in it."""
-    return {**_settings("actors", _FPS)(config), "clips": clip_listing(config.actors.motion)}
+    return {**_body_settings(config), "clips": clip_listing(config.actors.motion)}
 
 
 def _motion(context: StageContext) -> tuple[BodyMotion, ...]:
@@ -271,7 +278,7 @@ def _tracks(context: StageContext) -> SequenceTracks:
 
 def _export(context: StageContext) -> None:
     room, actors = context.one("room", Room), context.many("actors", ActorMesh)
-    EXPORTERS["tapvid_mv"]().write(
+    write_sequence(
         context.folder / SEQUENCE_FOLDER,
         room,
         actors,
@@ -319,7 +326,7 @@ STAGES = (
         redraw=_every_time,
     ),
     Stage(40, "motion", 3, ("room", "routes"), _motion_settings, _motion),
-    Stage(50, "actors", 3, ("room", "routes", "motion"), _settings("actors", _FPS), _actors),
+    Stage(50, "actors", 3, ("room", "routes", "motion"), _body_settings, _actors),
     Stage(
         60,
         "cameras",
