@@ -1,0 +1,1 @@
+"""Scores of predicted tracks against finished sequences, and simple trackers to compare with."""
