@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Float64
 from scipy.spatial.transform import Rotation
 
-FINGERS = ("index", "middle", "pinky", "ring", "thumb")
-# Bend of the three joints of each finger from the knuckle outward, radians; the thumb's lies across the palm.
+# Bend of the three joints of each finger from the knuckle outward, radians: index, middle, pinky, ring, thumb, as
+# SMPL-X orders them; the thumb's lies across the palm.
 _RELAXED = ((0.21, 0.38, 0.24), (0.31, 0.45, 0.28), (0.42, 0.49, 0.31), (0.38, 0.49, 0.31), (0.10, 0.15, 0.15))
 _FIST = ((1.25, 1.6, 1.0), (1.3, 1.65, 1.0), (1.3, 1.6, 1.0), (1.3, 1.65, 1.0), (0.5, 0.6, 0.7))
 _SHAPES: dict[str, tuple[tuple[float, float, float], ...]] = {

@@ -119,11 +119,6 @@ def build_window(plan: RoomPlan, number: int) -> list[Part]:
     ]
 
 
-def window_size_m(window: Opening) -> tuple[float, float]:
-    """Width and height of the hole."""
-    return window.width_m, window.head_m - window.sill_m
-
-
 def outward(plan: RoomPlan, window: Opening) -> np.ndarray:
     """The direction out of the room through a window."""
     cosine, sine = QUARTER_TURNS[plan.floor.walls[window.wall].quarters]
