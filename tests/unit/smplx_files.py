@@ -199,5 +199,5 @@ def write_model(path: Path, directions: int = 20, size: float = 1.0, **changed: 
     arrays = {**model_arrays(directions, size), **changed}
     path.parent.mkdir(parents=True, exist_ok=True)
     kept = {name: array for name, array in arrays.items() if array is not None}
-    np.savez_compressed(path, **kept)  # type: ignore[arg-type]
+    np.savez_compressed(path, **kept)
     return path

@@ -50,8 +50,8 @@ def test_a_binding_is_read_as_written(tmp_path: Path) -> None:
     )
     binding = read_binding(path, tmp_path)
     assert binding.base_vertices.tolist() == [[10, 20, 30], [12, 13, 14], [17, 17, 17]]
-    assert np.allclose(binding.shares, [[0.5, 0.3, 0.2], [0.2, 0.3, 0.5], [1, 0, 0]])
-    assert np.allclose(binding.offset_dm, [[0.1, -0.2, 0.3], [0, 0, 0], [0, 0, 0]])
+    assert np.allclose(binding.shares, [[0.5, 0.3, 0.2], [0.2, 0.3, 0.5], [1.0, 0.0, 0.0]])
+    assert np.allclose(binding.offset_dm, [[0.1, -0.2, 0.3], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     assert np.flatnonzero(binding.hides).tolist() == [5, 7, 8, 9, 19157]
     assert (binding.name, binding.tags, binding.depth) == ("a thing", ("female",), 41)
     assert binding.mesh_path == path.parent / "thing.obj"

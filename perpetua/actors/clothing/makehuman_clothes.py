@@ -9,7 +9,7 @@ from PIL import Image
 from perpetua.actors.bodies.hair import hair_image, make_hair, scalp_field_m
 from perpetua.actors.bodies.makehuman import VERTEX_COUNT, base_mesh
 from perpetua.actors.bodies.people import Person
-from perpetua.actors.bodies.rig import base_weights
+from perpetua.actors.bodies.rig import base_weights, joint_index
 from perpetua.actors.bodies.skin import SKIN_PX, texel_places_m
 from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb
 from perpetua.actors.clothing.mhclo import Binding, read_mesh
@@ -149,12 +149,25 @@ def _sewn(garment: Garment, wearer: Wearer, look: Look | None, image: np.ndarray
     return Piece(vertices_m, weights, (ActorPart(garment.kind, faces, uv, shade),))
 
 
+def _with_stiff_soles(shoes: Piece) -> Piece:
+    """Shoes whose low part follows ankles and toes alone, so that the soles stay flat whatever the shins do."""
+    low = shoes.vertices_m[:, 2] < float(shoes.vertices_m[:, 2].min()) + _FOOT_M
+    weights = shoes.weights.copy()
+    for side, here in (("left", shoes.vertices_m[:, 1] > 0.0), ("right", shoes.vertices_m[:, 1] <= 0.0)):
+        ankle, ball = joint_index(f"{side}_ankle"), joint_index(f"{side}_foot")
+        toes = weights[low & here, ball]
+        weights[low & here] = 0.0
+        weights[low & here, ball], weights[low & here, ankle] = toes, 1.0 - toes
+    return replace(shoes, weights=weights)
+
+
 def _footing(shoes: Piece) -> Footing:
     """Heels and balls of a pair of shoes: middles of the sole at the back and towards the front."""
     used = np.unique(shoes.parts[0].faces)
     points = shoes.vertices_m[used]
     floor_m = float(points[:, 2].min())
-    heels, toes = [], []
+    heels: list[np.ndarray] = []
+    toes: list[np.ndarray] = []
     for sign in (1.0, -1.0):
         side = points[sign * points[:, 1] > 0.0]
         low = side[side[:, 2] < floor_m + _FOOT_M]
@@ -213,8 +226,10 @@ def wear(wearer: Wearer, person: Person, actor: int, config: ClothingConfig, see
     chosen = _choose(wardrobe, person, actor, config.hat_share, seed)
     rng = seed.stream("cloth", actor)
     pieces, hidden = _layers(chosen, wearer, wardrobe, rng)
-    footing = _footing(pieces["shoes"]) if "shoes" in pieces else None
-    if footing is None:
+    if "shoes" in pieces:
+        pieces["shoes"] = _with_stiff_soles(pieces["shoes"])
+        footing = _footing(pieces["shoes"])
+    else:
         pieces["shoes"], footing = make_shoes(wearer, person.outfit.shoes, rng)
         hidden |= shoe_field_m(person.outfit.shoes, base_mesh().vertices_m) > 0.02
     hair_look = load_looks(chosen.hair, wardrobe) if chosen.hair is not None else None
