@@ -267,6 +267,25 @@ def tracks(sequence: Path, count: int, seed: int, from_pixels: str | None, out: 
 
 
 @main.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--format", "export_format", metavar="NAME", required=True,
+              help="kubric (multi-view, as MVTracker reads it), tapvid3d (one file per view) or rerun (a recording).")  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write into.")
+def export(folders: tuple[Path, ...], export_format: str, out: Path) -> None:
+    """Write finished sequences in the layout of another reader.
+
+    FOLDERS are sequence folders, or folders that hold some. Only formats that tell objects apart look into the run's
+    work area, and do without where it is gone.
+    """
+    from perpetua.audit.verify import find_sequences
+    from perpetua.pipeline.convert import export_sequence
+
+    for folder in (folder for given in folders for folder in find_sequences(given)):
+        for made in export_sequence(folder, export_format, out):
+            click.echo(f"wrote {made}")
+
+
+@main.command()
 def assets() -> None:
     """List outside assets: present or missing, licence, and what is lost without them."""
     from perpetua.assets import asset_folder, load_manifest

@@ -77,7 +77,7 @@ def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> i
 def _exit_code(request: GenerateRequest, failures: dict[int, str]) -> int:
     if not failures:
         return 0
-    layouts = [OutputLayout(request.out, request.config.export.split, request.seed, room) for room in failures]
+    layouts = [OutputLayout(request.out, request.config.export, request.seed, room) for room in failures]
     codes = {read_json(layout.failure_file).get("exit_code") for layout in layouts}
     return InputError.exit_code if codes == {InputError.exit_code} else PerpetuaError.exit_code
 
@@ -86,7 +86,7 @@ def make_room(request: GenerateRequest, until: str, room: int, on_event: OnEvent
     """One room through the stages, and its contact sheet."""
     RoomRun(request.config, request.seed, room, request.out, request.device, on_event).run(until)
     if until == STAGES[-1].name:
-        layout = OutputLayout(request.out, request.config.export.split, request.seed, room)
+        layout = OutputLayout(request.out, request.config.export, request.seed, room)
         if not layout.contact_sheet.exists():
             partial_sheet = layout.contact_sheet.with_name(f".{layout.contact_sheet.name}")
             layout.contact_sheet.parent.mkdir(parents=True, exist_ok=True)
@@ -125,7 +125,7 @@ def _say_cost(request: GenerateRequest, cost: Cost, free_bytes: float, until: st
 def _say_result(request: GenerateRequest, failures: dict[int, str], until: str, console: Console) -> None:
     say = _speaker(console)
     for room in request.rooms:
-        layout = OutputLayout(request.out, request.config.export.split, request.seed, room)
+        layout = OutputLayout(request.out, request.config.export, request.seed, room)
         if room in failures:
             say(f"room {room} failed: {failures[room]}")
         elif until == STAGE_NAMES[-1]:

@@ -91,7 +91,7 @@ def write_room_gallery(request: GalleryRequest, say: Callable[[str], None]) -> i
 def _card_of(request: GalleryRequest, index: int, pictures: Path, say: Callable[[str], None]) -> RoomCard:
     run = RoomRun(request.config, request.seed, index, request.out, request.device, lambda event: None)
     run.run(LAST_STAGE)
-    layout = OutputLayout(request.out, request.config.export.split, request.seed, index)
+    layout = OutputLayout(request.out, request.config.export, request.seed, index)
     folders = {stage.name: StageFolder(layout.work_folder, stage.number, stage.name).final for stage in STAGES}
     scripts = scripts_sha256((BAKE_SCRIPT.name, RENDER_SCRIPT.name))
     key = key_of({"room": run.keys[LAST_STAGE], "scripts": scripts, "drawing": DRAWING_VERSION})

@@ -1,11 +1,49 @@
 """Settings of the export stage."""
 
-from pydantic import Field
+import re
+from math import isclose
+
+from pydantic import Field, field_validator
 
 from perpetua.config_base import Section
+from perpetua.seeding import stream
+
+_FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 
 
 class ExportConfig(Section):
     """Where a finished sequence goes and what is kept."""
 
-    split: str = Field("train", pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", description="folder of the data split")
+    splits: dict[str, float] = Field(
+        default={"train": 1.0},
+        description="folders of the data splits, each with its share of the rooms, for example {train: 0.9, val: 0.1}; "
+        "shares are in 0..1 and sum to 1",
+    )
+
+    @field_validator("splits")
+    @classmethod
+    def _shares_sum_to_one(cls, splits: dict[str, float]) -> dict[str, float]:
+        for name, share in splits.items():
+            if _FOLDER_NAME.fullmatch(name) is None:
+                raise ValueError(f"must have names of letters, digits, '-' and '_', so '{name}' cannot be a split")
+            if not 0.0 <= share <= 1.0:
+                raise ValueError(f"must have shares in 0..1, so '{name}' cannot have {share}")
+        if not isclose(sum(splits.values()), 1.0, abs_tol=1e-6):
+            raise ValueError(f"must have shares that sum to 1, and they sum to {sum(splits.values()):g}")
+        return splits
+
+
+def split_of_room(config: ExportConfig, seed: int, room: int) -> str:
+    """The split that a room goes to.
+
+    It is drawn for each room by itself, so it stays as more rooms are made; the names of the splits count, not the
+    order in which they are written.
+    """
+    drawn = stream(seed, room, "export", "split").random()
+    taken = [name for name in sorted(config.splits) if config.splits[name] > 0.0]
+    end = 0.0
+    for name in taken:
+        end += config.splits[name]
+        if drawn < end:
+            return name
+    return taken[-1]

@@ -12,7 +12,6 @@ from perpetua.actors.types import ActorMesh
 from perpetua.cameras.types import CameraPath
 from perpetua.files import file_sha256
 from perpetua.formats import layout
-from perpetua.formats.source import EXPORTERS
 from perpetua.geometry.transforms import invert_rigid
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.types import Room
@@ -24,31 +23,29 @@ FAST_M = 2.0
 FAST_FRAMES = 24
 
 
-@EXPORTERS.register("tapvid_mv")
-class TapvidMv:
-    """The layout that the benchmark's readers expect."""
+def write_sequence(
+    folder: Path,
+    room: Room,
+    actors: tuple[ActorMesh, ...],
+    cameras: tuple[CameraPath, ...],
+    views: tuple[RenderedView, ...],
+    tracks: SequenceTracks,
+    record: dict[str, Any],
+) -> None:
+    """Writes a sequence into ``folder``, which is made if need be; equal arguments give equal bytes.
 
-    def write(
-        self,
-        folder: Path,
-        room: Room,
-        actors: tuple[ActorMesh, ...],
-        cameras: tuple[CameraPath, ...],
-        views: tuple[RenderedView, ...],
-        tracks: SequenceTracks,
-        record: dict[str, Any],
-    ) -> None:
-        """Writes a sequence into ``folder``; equal arguments give equal bytes."""
-        folder.mkdir(parents=True, exist_ok=True)
-        _write_tracks(folder, tracks, SceneMeshes.of(room, actors))
-        actor_indices = [actor.object_index for actor in actors]
-        for index, (camera, view) in enumerate(zip(cameras, views, strict=True)):
-            view_folder = folder / str(index)
-            view_folder.mkdir(exist_ok=True)
-            np.save(view_folder / layout.VISIBILITY, tracks.views.visible[index])
-            _write_camera(view_folder, camera)
-            _write_frames(view_folder, view, actor_indices)
-        _write_record(folder, tracks.points, record)
+    ``record`` says where the sequence comes from.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    _write_tracks(folder, tracks, SceneMeshes.of(room, actors))
+    actor_indices = [actor.object_index for actor in actors]
+    for index, (camera, view) in enumerate(zip(cameras, views, strict=True)):
+        view_folder = folder / str(index)
+        view_folder.mkdir(exist_ok=True)
+        np.save(view_folder / layout.VISIBILITY, tracks.views.visible[index])
+        _write_camera(view_folder, camera)
+        _write_frames(view_folder, view, actor_indices)
+    _write_record(folder, tracks.points, record)
 
 
 def _write_tracks(folder: Path, tracks: SequenceTracks, meshes: SceneMeshes) -> None:

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from jaxtyping import UInt16
+
 from perpetua.actors.types import ActorMesh, Route
 from perpetua.audit.deep import DeepScene
 from perpetua.cameras.types import CameraPath
@@ -53,6 +56,16 @@ def load_kept_scene(sequence_folder: Path) -> KeptScene:
         cameras=kept["cameras"],
         views=kept["render"],
     )
+
+
+def kept_object_index(sequence_folder: Path) -> tuple[UInt16[np.ndarray, "T H W"], ...] | None:
+    """The rendered object index of each view, or None where the work area does not hold it."""
+    folder = sequence_folder.resolve()
+    work = folder.parent.parent / WORK_FOLDER / folder.name
+    stage = next(stage for stage in STAGES if stage.name == "render")
+    if StageFolder(work, stage.number, stage.name).manifest() is None:
+        return None
+    return tuple(view.object_index for view in _load(work, stage.name))
 
 
 def _load(work: Path, name: str) -> Any:

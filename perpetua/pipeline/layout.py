@@ -10,6 +10,8 @@ from pathlib import Path
 from perpetua.config import Config
 from perpetua.errors import InputError, PerpetuaError
 from perpetua.files import write_json
+from perpetua.formats.config import ExportConfig, split_of_room
+from perpetua.formats.layout import AUDIT
 
 WORK_FOLDER = ".work"
 RUN_FILE = "run.json"
@@ -26,7 +28,7 @@ class OutputLayout:
     """The folders of one room below the output folder."""
 
     out: Path
-    split: str
+    export: ExportConfig
     seed: int
     room: int
 
@@ -38,7 +40,15 @@ class OutputLayout:
     @property
     def sequence_folder(self) -> Path:
         """Where the finished sequence appears."""
-        return self.out / self.split / sequence_name(self.seed, self.room)
+        split = split_of_room(self.export, self.seed, self.room)
+        return self.out / split / sequence_name(self.seed, self.room)
+
+    @property
+    def other_sequence_folders(self) -> list[Path]:
+        """Folders of splits, other than the room's own, in which an earlier config published the room."""
+        own = self.sequence_folder
+        found = (path for path in self.out.glob(f"*/{own.name}") if path.parent.name != WORK_FOLDER)
+        return sorted(path for path in found if path != own and (path / AUDIT).is_file())
 
     @property
     def contact_sheet(self) -> Path:

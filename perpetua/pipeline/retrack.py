@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from perpetua.errors import InputError
-from perpetua.formats import EXPORTERS
+from perpetua.formats.tapvid_mv import write_sequence
 from perpetua.pipeline.kept import KeptScene, load_kept_scene
 from perpetua.pipeline.record import sequence_record
 from perpetua.pipeline.store import replace_folder
@@ -66,7 +66,7 @@ def write_other_tracks(
     record = sequence_record(config, StageSeed(seed, kept.room_number, "tracks"), kept.room, kept.routes, kept.actors)
     partial = target.with_name(f".{target.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
-    EXPORTERS["tapvid_mv"]().write(partial, kept.room, kept.actors, kept.cameras, kept.views, tracks, record)
+    write_sequence(partial, kept.room, kept.actors, kept.cameras, kept.views, tracks, record)
     replace_folder(partial, target)
     return tracks
 

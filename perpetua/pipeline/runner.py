@@ -39,7 +39,7 @@ class RoomRun:
     values: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.layout = OutputLayout(self.out, self.config.export.split, self.seed, self.room)
+        self.layout = OutputLayout(self.out, self.config.export, self.seed, self.room)
 
     def run(self, until: str) -> None:
         """Runs the stages up to and with ``until``; the last one publishes the sequence.
@@ -162,6 +162,9 @@ class RoomRun:
         # A picture of an earlier sequence of this name must not outlive it.
         self.layout.contact_sheet.unlink(missing_ok=True)
         store.replace_folder(partial, target)
+        # One room in two splits would leak from training to testing.
+        for moved in self.layout.other_sequence_folders:
+            shutil.rmtree(moved)
 
     def _report(self, kind: Any, stage: str = "", **details: Any) -> None:
         self.on_event(Event(kind, self.room, stage, **details))

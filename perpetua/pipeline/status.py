@@ -82,7 +82,7 @@ def read_status(out: Path) -> StatusReport:
 
 
 def _room_status(out: Path, run: RunRecord, room: int) -> RoomStatus:
-    layout = OutputLayout(out, run.config.export.split, run.seed, room)
+    layout = OutputLayout(out, run.config.export, run.seed, room)
     published = published_redraw(layout, run.config)
     rejected = rejected_draws(layout, run.config) if published is None else published
     keys = stage_keys(run.config, run.seed, room, rejected)
@@ -128,7 +128,7 @@ def clean_work_area(out: Path, unfinished: bool) -> float:
     freed = 0.0
     for room in report.rooms:
         if room.finished or unfinished:
-            layout = OutputLayout(out, run.config.export.split, run.seed, room.room)
+            layout = OutputLayout(out, run.config.export, run.seed, room.room)
             freed += _remove(layout.work_folder)
             for left in layout.sequence_folder.parent.glob(f".{layout.sequence_folder.name}.*"):
                 freed += _remove(left)

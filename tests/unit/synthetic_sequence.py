@@ -4,7 +4,7 @@ from pathlib import Path
 
 from synthetic_scene import Scene, make_scene
 
-from perpetua.formats import EXPORTERS
+from perpetua.formats.tapvid_mv import write_sequence
 from perpetua.seeding import StageSeed
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.follow import TrackScene
@@ -28,7 +28,7 @@ def write_scene(folder: Path) -> tuple[Scene, SequenceTracks]:
     names += [
         {"object_index": actor.object_index, "category": "person", "actor": actor.actor} for actor in scene.actors
     ]
-    EXPORTERS["tapvid_mv"]().write(
+    write_sequence(
         folder, scene.room, scene.actors, scene.cameras, scene.views, tracks, {"seed": 5, "objects": names}
     )
     return scene, tracks

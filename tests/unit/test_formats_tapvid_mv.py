@@ -142,5 +142,5 @@ def test_depth_and_masks_may_be_missing(sequence: Path) -> None:
 
 
 def test_unknown_exporter_names_the_nearest() -> None:
-    with pytest.raises(ConfigError, match="did you mean 'tapvid_mv'"):
-        EXPORTERS["tapvid"]
+    with pytest.raises(ConfigError, match="did you mean 'tapvid3d'"):
+        EXPORTERS["tapvid3"]

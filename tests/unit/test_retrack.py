@@ -31,7 +31,7 @@ def sequence(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("run")
     config = load_config("tiny", assignments=("tracks.count=60",))
     open_run(out, SEED, range(ROOM, ROOM + 1), config, False)
-    layout = OutputLayout(out, "train", SEED, ROOM)
+    layout = OutputLayout(out, config.export, SEED, ROOM)
     layout.sequence_folder.mkdir(parents=True)
     scene = make_scene()
     routes = tuple(Route(actor.actor, np.zeros((6, 3)), np.zeros(6)) for actor in scene.actors)

@@ -62,7 +62,7 @@ def _run(
 ) -> OutputLayout:
     config = config or Config()
     RoomRun(config, 7, room, out, "cpu", lambda event: None, _table(ran, fail)).run(until)
-    return OutputLayout(out, config.export.split, 7, room)
+    return OutputLayout(out, config.export, 7, room)
 
 
 def test_finished_room_is_published_and_not_computed_again(tmp_path: Path) -> None:
@@ -102,6 +102,13 @@ def test_picture_of_a_replaced_sequence_is_removed(tmp_path: Path) -> None:
     assert not layout.contact_sheet.exists()
 
 
+def test_a_room_that_moves_to_another_split_leaves_the_one_it_was_in(tmp_path: Path) -> None:
+    before = _run(tmp_path, Counter())
+    after = _run(tmp_path, Counter(), Config.model_validate({"export": {"splits": {"val": 1.0}}}))
+    assert after.sequence_folder == tmp_path / "val" / before.sequence_folder.name
+    assert after.sequence_folder.is_dir() and after.work_folder.is_dir() and not before.sequence_folder.exists()
+
+
 def test_damaged_stage_is_computed_again(tmp_path: Path) -> None:
     ran: RunCount = Counter()
     layout = _run(tmp_path, ran, until="export")
@@ -114,7 +121,7 @@ def test_failure_is_recorded_and_forgotten_when_mended(tmp_path: Path) -> None:
     ran: RunCount = Counter()
     with pytest.raises(AuditError):
         _run(tmp_path, ran, fail="export")
-    layout = OutputLayout(tmp_path, "train", 7, 0)
+    layout = OutputLayout(tmp_path, Config().export, 7, 0)
     assert json.loads(layout.failure_file.read_text()) == {"stage": "export", "reason": "export does not work out"}
     _run(tmp_path, ran)
     assert not layout.failure_file.exists()
