@@ -2,7 +2,7 @@
 tracks.
 
 Both begin at the surface that depth shows at the query's pixel. A point is called visible in a view where it projects
-onto the image and depth there is its own within 5%.
+onto the image and depth there is its own within 5%; so it is found again where tracking lost it and it stayed.
 """
 
 from collections.abc import Callable
@@ -32,12 +32,12 @@ def still(sequence: Sequence) -> Predictions:
         InputError: the sequence has no depth.
     """
     start_m = _query_points_m(Truth(sequence))
-    return _as_predictions(sequence, np.repeat(start_m[None], len(sequence.tracks_m), axis=0), None)
+    return _predictions(sequence, np.repeat(start_m[None], len(sequence.tracks_m), axis=0))
 
 
 def flow(sequence: Sequence) -> Predictions:
     """Optical flow (pyramidal Lucas-Kanade) from the query through its view's images, forth and back in time, lifted
-    with depth; a point that is lost stays where it was last, hidden.
+    with depth; a point that is lost stays where it was last.
 
     Raises:
         InputError: the sequence has no depth.
@@ -45,7 +45,6 @@ def flow(sequence: Sequence) -> Predictions:
     truth = Truth(sequence)
     start_m = _query_points_m(truth)
     place_m = np.repeat(start_m[None], truth.size.frames, axis=0)
-    followed = truth.at_query.copy()
     for number, view in enumerate(sequence.views):
         queried = np.flatnonzero(truth.query_view == number)
         if len(queried) == 0:
@@ -53,8 +52,8 @@ def flow(sequence: Sequence) -> Predictions:
         grey = [_grey(view.image(frame)) for frame in range(truth.size.frames)]
         for step in (1, -1):
             way = _Way(view, grey, queried, truth.query_frame[queried], sequence.queries_xytv[queried, :2].copy())
-            way.follow(place_m, followed, step)
-    return _as_predictions(sequence, place_m, followed)
+            way.follow(place_m, step)
+    return _predictions(sequence, place_m)
 
 
 BASELINES: dict[str, Callable[[Sequence], Predictions]] = {"still": still, "flow": flow}
@@ -70,8 +69,8 @@ class _Way:
     query_frame: Int64[np.ndarray, " N"]
     pixel_px: Float32[np.ndarray, "N 2"]
 
-    def follow(self, place_m: Float64[np.ndarray, "F P 3"], followed: Bool[np.ndarray, "F P"], step: int) -> None:
-        """Enters places in ``place_m`` and ``followed`` frame by frame, forth (1) or back (-1)."""
+    def follow(self, place_m: Float64[np.ndarray, "F P 3"], step: int) -> None:
+        """Enters places in ``place_m`` frame by frame, forth (1) or back (-1)."""
         alive = np.isfinite(place_m[self.query_frame, self.tracks]).all(axis=1)
         frames = list(range(len(self.grey)))[::step]
         for before, after in pairwise(frames):
@@ -86,7 +85,6 @@ class _Way:
             found &= np.isfinite(leap_m) & (leap_m <= LEAP_M)
             alive[moving] = found
             place_m[after, self.tracks[moving[found]]] = lifted_m[found]
-            followed[after, self.tracks[moving[found]]] = True
 
 
 def _lucas_kanade(
@@ -146,21 +144,19 @@ def _depth_at(view: SequenceView, frame: int, pixel_px: Float64[np.ndarray, "N 2
     return np.where(inside & (found_m > 0.0), found_m, np.nan)
 
 
-def _as_predictions(
-    sequence: Sequence, place_m: Float64[np.ndarray, "F P 3"], followed: Bool[np.ndarray, "F P"] | None
-) -> Predictions:
-    """Places in the world as predictions for every view; in the query's view a point is visible only if followed."""
-    truth = Truth(sequence)
-    camera = np.empty((truth.size.views, *place_m.shape), np.float32)
+def _predictions(sequence: Sequence, place_m: Float64[np.ndarray, "F P 3"]) -> Predictions:
+    """Places in the sequence's world as predictions for every view; visible where depth agrees.
+
+    Raises:
+        InputError: the sequence has no depth.
+    """
+    camera = np.empty((len(sequence.views), *place_m.shape), np.float32)
     visible = np.zeros(camera.shape[:3], bool)
     for number, view in enumerate(sequence.views):
         in_camera_m = transform_points(view.camera_from_world.astype(np.float64), place_m)
         camera[number] = in_camera_m
         for frame in range(len(place_m)):
             visible[number, frame] = _depth_agrees(view, frame, in_camera_m[frame])
-        if followed is not None:
-            queried = truth.query_view == number
-            visible[number, :, queried] &= followed[:, queried].T
     first_from_world = sequence.views[0].camera_from_world[0].astype(np.float64)
     world = transform_points(first_from_world, place_m.reshape(-1, 3)).reshape(place_m.shape)
     return Predictions(camera, world.astype(np.float32), visible, visible.any(axis=0), None)

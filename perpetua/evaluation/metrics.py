@@ -13,8 +13,9 @@ figure:
 - Jaccard: true positives (truly visible, predicted visible, position right) over truly visible entries plus false
   positives (predicted visible, and hidden or not right); averaged over the thresholds (AJ).
 
-Not settled there, and settled here: where no finite position is given, the prediction is missing. Its position is
-never right, its visibility counts as wrong whatever it is, and in Jaccard it is a miss but no false positive.
+Not settled there, and settled here: where no finite position is given (or one beyond 1e100), the prediction is
+missing. Its position is never right, its visibility counts as wrong whatever it is, and in Jaccard it is a miss but no
+false positive.
 """
 
 from collections.abc import Iterable
@@ -24,6 +25,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Float64, Int64
 
 THRESHOLDS_PX = (1, 2, 4, 8, 16)
+# Larger numbers are no positions, and their squares overflow.
+FARTHEST = 1e100
 # Singular values that differ by more than this factor belong to points on a line or in one place.
 LEAST_SPREAD = 1e-9
 
@@ -93,12 +96,11 @@ def tally_entries(
         pixel_m: how wide one pixel is at each entry, Z / f in metres.
         counted: the entries that take part; what the others hold is ignored.
     """
-    given = np.isfinite(predicted_m).all(axis=-1)
+    given = are_given(predicted_m)
     claimed = predicted_visible & given
-    # Huge predictions are far off, and their squares may overflow to infinity, which is far off too.
-    with np.errstate(invalid="ignore", over="ignore"):
-        apart_m = np.linalg.norm(np.asarray(predicted_m, np.float64) - np.asarray(true_m, np.float64), axis=-1)
-        near = [given & (apart_m < width_px * np.asarray(pixel_m, np.float64)) for width_px in THRESHOLDS_PX]
+    offset_m = np.where(given[..., None], np.asarray(predicted_m, np.float64) - np.asarray(true_m, np.float64), 0.0)
+    apart_m = np.linalg.norm(offset_m, axis=-1)
+    near = [given & (apart_m < width_px * np.asarray(pixel_m, np.float64)) for width_px in THRESHOLDS_PX]
     return Tally(
         entries=int(counted.sum()),
         occlusion_right=int((counted & given & (predicted_visible == truly_visible)).sum()),
@@ -113,19 +115,23 @@ def _counts(chosen: Iterable[Bool[np.ndarray, "*entries"]]) -> Int64[np.ndarray,
     return np.array([int(entries.sum()) for entries in chosen], np.int64)
 
 
+def are_given(points: Float[np.ndarray, "*batch 3"]) -> Bool[np.ndarray, "*batch"]:
+    """Whether points are there at all: finite, and not beyond all measure."""
+    return np.asarray((np.abs(points.astype(np.float64)) < FARTHEST).all(axis=-1))
+
+
 def median_scale(true_m: Float[np.ndarray, "N 3"], predicted_m: Float[np.ndarray, "N 3"]) -> float:
     """The factor that makes the median distance of predicted points from the origin that of the true ones.
 
     Points whose prediction is missing are left out on both sides. Without any, or where all predictions lie on the
     origin, there is nothing to scale by, and the factor is 1.
     """
-    given = np.isfinite(predicted_m).all(axis=1)
+    given = are_given(predicted_m)
     if not given.any():
         return 1.0
     true_distance_m = np.median(np.linalg.norm(np.asarray(true_m[given], np.float64), axis=1))
     predicted_distance_m = np.median(np.linalg.norm(np.asarray(predicted_m[given], np.float64), axis=1))
-    scale = true_distance_m / predicted_distance_m if predicted_distance_m > 0.0 else 1.0
-    return float(scale) if np.isfinite(scale) else 1.0
+    return float(true_distance_m / predicted_distance_m) if predicted_distance_m > 1.0 / FARTHEST else 1.0
 
 
 @dataclass(frozen=True)
@@ -149,7 +155,7 @@ def fit_similarity(true_m: Float[np.ndarray, "N 3"], predicted_m: Float[np.ndarr
     Returns:
         None where fewer than three points are given, or all on one line: then rotation is open.
     """
-    given = np.isfinite(predicted_m).all(axis=1) & np.isfinite(true_m).all(axis=1)
+    given = are_given(predicted_m) & are_given(true_m)
     true, predicted = np.asarray(true_m[given], np.float64), np.asarray(predicted_m[given], np.float64)
     if len(true) < 3:
         return None
@@ -157,7 +163,7 @@ def fit_similarity(true_m: Float[np.ndarray, "N 3"], predicted_m: Float[np.ndarr
     true, predicted = true - true_middle, predicted - predicted_middle
     for cloud in (true, predicted):
         spread = np.linalg.svd(cloud, compute_uv=False)
-        if not np.isfinite(spread).all() or spread[1] <= LEAST_SPREAD * spread[0]:
+        if spread[1] <= LEAST_SPREAD * spread[0]:
             return None
     left, stretch, right = np.linalg.svd(true.T @ predicted)
     upright = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])

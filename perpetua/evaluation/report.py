@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.markup import escape
 from rich.table import Table
 
 from perpetua.audit.verify import find_sequences
@@ -53,7 +54,7 @@ class EvaluationReport:
         table = Table("sequence", "regime", "AJ", "APD", "OA", title_justify="left")
         for name, evaluation in self.found.items():
             if evaluation is None:
-                table.add_row(name, "not predicted: counts as a failure", "0.0000", "0.0000", "0.0000")
+                table.add_row(escape(name), "not predicted: counts as a failure", "0.0000", "0.0000", "0.0000")
             else:
                 _add_rows(table, name, evaluation.scores)
         if len(self.found) > 1:
@@ -65,7 +66,7 @@ class EvaluationReport:
 def _add_rows(table: Table, name: str, scores: dict[str, Scores]) -> None:
     for regime, found in scores.items():
         figures = (found.average_jaccard, found.average_position_accuracy, found.occlusion_accuracy)
-        table.add_row(name, regime, *(f"{figure:.4f}" for figure in figures))
+        table.add_row(escape(name), regime, *(f"{figure:.4f}" for figure in figures))
         name = ""
 
 
