@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 from perpetua.errors import InputError
-from perpetua.formats import EXPORTERS
+from perpetua.formats.exporters import EXPORTERS
 from perpetua.formats.reader import read_sequence
 from perpetua.formats.source import ExportSource
 from perpetua.pipeline.kept import kept_object_index

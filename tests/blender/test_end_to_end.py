@@ -33,7 +33,7 @@ def _perpetua(*arguments: str, code: int = 0) -> str:
 
 
 def _layout(out: Path) -> OutputLayout:
-    return OutputLayout(out, "train", SEED, ROOM)
+    return OutputLayout(out, load_config("tiny").export, SEED, ROOM)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from synthetic_sequence import write_scene
 
 from perpetua.cli import main
 from perpetua.errors import EnvironmentSetupError, InputError, SequenceFormatError
-from perpetua.formats import EXPORTERS
+from perpetua.formats.exporters import EXPORTERS
 from perpetua.formats.kubric import scene_number
 from perpetua.formats.reader import read_sequence
 from perpetua.formats.source import ExportSource

@@ -9,7 +9,7 @@ import pytest
 from synthetic_sequence import write_scene
 
 from perpetua.errors import ConfigError, SequenceFormatError
-from perpetua.formats import EXPORTERS
+from perpetua.formats.exporters import EXPORTERS
 from perpetua.formats.reader import read_sequence
 
 
