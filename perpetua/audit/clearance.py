@@ -16,6 +16,8 @@ from perpetua.geometry.mesh import TriMesh
 FAR_M = 1.0
 # FCL measures solids; these are as thin as a point and a line for our purpose.
 THIN_M = 1e-3
+# The longest edge of a moving mesh is looked for in every n-th frame, and taken to be this much longer.
+EDGE_FRAMES, EDGE_SLACK = 24, 1.25
 
 
 def points_to_mesh_m(points_m: Float64[np.ndarray, "N 3"], mesh: TriMesh) -> Float64[np.ndarray, " N"]:
@@ -84,21 +86,39 @@ def points_to_moving_mesh_m(
     low_m, high_m = vertices_m.min(axis=1), vertices_m.max(axis=1)
     low_m, high_m = np.minimum(low_m[frame], low_m[frame + 1]), np.maximum(high_m[frame], high_m[frame + 1])
     beyond_m = np.maximum(np.maximum(low_m - points_m, points_m - high_m), 0.0)
+    near = np.flatnonzero(np.linalg.norm(beyond_m, axis=1) < FAR_M)
     distance_m = np.full(len(points_m), FAR_M)
-    for index in np.flatnonzero(np.linalg.norm(beyond_m, axis=1) < FAR_M):
+    longest_m = _longest_edge_m(vertices_m, faces) if len(near) else 0.0
+    for index in near:
         share = time[index] - frame[index]
         before_m, after_m = vertices_m[frame[index] : frame[index] + 2].astype(np.float64)
-        distance_m[index] = _to_triangles_m(points_m[index], (1.0 - share) * before_m + share * after_m, faces)
+        at_time_m = (1.0 - share) * before_m + share * after_m
+        distance_m[index] = _to_triangles_m(points_m[index], at_time_m, faces, longest_m)
     return np.minimum(distance_m, FAR_M)
 
 
+def _longest_edge_m(vertices_m: Float32[np.ndarray, "T P 3"], faces: Int32[np.ndarray, "F 3"]) -> float:
+    """No edge is longer at any time: bodies do not stretch by the slack between the frames looked at."""
+    longest_m = 0.0
+    for placed_m in vertices_m[::EDGE_FRAMES]:
+        corners_m = placed_m[faces]
+        longest_m = max(longest_m, *(float(np.abs(corners_m[:, k] - corners_m[:, k - 1]).max()) for k in range(3)))
+    return float(np.sqrt(3.0)) * EDGE_SLACK * longest_m
+
+
 def _to_triangles_m(
-    point_m: Float64[np.ndarray, "3"], vertices_m: Float64[np.ndarray, "P 3"], faces: Int32[np.ndarray, "F 3"]
+    point_m: Float64[np.ndarray, "3"],
+    vertices_m: Float64[np.ndarray, "P 3"],
+    faces: Int32[np.ndarray, "F 3"],
+    longest_m: float,
 ) -> float:
-    to_vertex_m = np.linalg.norm(vertices_m - point_m, axis=1)
-    nearest = to_vertex_m[faces].min(axis=1)
-    corners_m = vertices_m[faces]
-    longest_m = max(float(np.linalg.norm(corners_m[:, k] - corners_m[:, k - 1], axis=1).max()) for k in range(3))
-    close = corners_m[nearest <= nearest.min() + longest_m]
+    """A triangle is no nearer than its nearest corner less its longest edge, so only few have to be measured."""
+    offset_m = vertices_m - point_m
+    to_vertex_m = np.sqrt(np.einsum("pc,pc->p", offset_m, offset_m))
+    least_m = to_vertex_m.min()
+    some = faces[(to_vertex_m <= least_m + longest_m)[faces].any(axis=1)]
+    corners_m = vertices_m[some]
+    edge_m = np.max([np.linalg.norm(corners_m[:, k] - corners_m[:, k - 1], axis=1) for k in range(3)], axis=0)
+    close = corners_m[to_vertex_m[some].min(axis=1) - edge_m <= least_m]
     closest_m = trimesh.triangles.closest_point(close, np.repeat(point_m[None], len(close), axis=0))
     return float(np.linalg.norm(closest_m - point_m, axis=1).min())

@@ -192,13 +192,15 @@ def _camera_distances_m(
 ) -> tuple[Float64[np.ndarray, "C T"], Float64[np.ndarray, "C T"]]:
     scene = join([thing.mesh for thing in room.objects])
     time = _sub_times(positions_m.shape[1])
-    to_scene, to_actors = [], []
-    for way_m in positions_m:
-        points_m = _between(way_m, time)
-        to_scene.append(_least_per_frame(points_to_mesh_m(points_m, scene)))
-        to_each = [points_to_moving_mesh_m(points_m, time, actor.vertices_m, actor.faces) for actor in actors]
-        to_actors.append(_least_per_frame(np.min(to_each, axis=0)))
-    return np.stack(to_scene), np.stack(to_actors)
+    points_m = np.concatenate([_between(way_m, time) for way_m in positions_m])
+    to_scene_m = points_to_mesh_m(points_m, scene).reshape(len(positions_m), -1)
+    times = np.tile(time, len(positions_m))
+    to_each_m = [points_to_moving_mesh_m(points_m, times, actor.vertices_m, actor.faces) for actor in actors]
+    to_actors_m = np.min(to_each_m, axis=0).reshape(len(positions_m), -1)
+    return (
+        np.stack([_least_per_frame(values) for values in to_scene_m]),
+        np.stack([_least_per_frame(values) for values in to_actors_m]),
+    )
 
 
 def _speed(ways_m: Float64[np.ndarray, "_ T 3"], fps: float) -> Float64[np.ndarray, "_ T"]:
