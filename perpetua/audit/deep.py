@@ -44,6 +44,17 @@ class _Met:
     triangle_m: Float64[np.ndarray, "N 3 3"]
 
 
+@dataclass(frozen=True)
+class Reach:
+    """How rays to points ended: whether at the point; the object and face they met (0 and -1: nothing), and how far
+    before the point that is."""
+
+    reached: Bool[np.ndarray, " N"]
+    object_index: Int64[np.ndarray, " N"]
+    face: Int64[np.ndarray, " N"]
+    short_m: Float64[np.ndarray, " N"]
+
+
 class _Part:
     """Some objects as one mesh for rays."""
 
@@ -64,7 +75,7 @@ class _Part:
         return np.asarray(self.shape.ray.intersects_first(origins, direction), np.int64)
 
 
-class _Rays:
+class SceneRays:
     """Rays at a scene, frame by frame."""
 
     def __init__(self, scene: DeepScene) -> None:
@@ -90,6 +101,22 @@ class _Rays:
             met.object_index[rays], met.face[rays] = part.owner[triangle], part.face[triangle]
             met.triangle_m[rays] = part.triangle_m[triangle]
         return met
+
+    def reach(
+        self,
+        frame: int,
+        origin_m: Float64[np.ndarray, "3"],
+        point_m: Float64[np.ndarray, "N 3"],
+        object_index: Int64[np.ndarray, " N"],
+        face: Int64[np.ndarray, " N"],
+    ) -> Reach:
+        """Whether rays from one point reach others, which lie on known faces of objects, before anything else."""
+        offset_m = point_m - origin_m
+        met = self.meet(frame, origin_m, offset_m)
+        own = (met.object_index == object_index) & (met.face == face)
+        short_m = (1.0 - _along(origin_m, offset_m, met.triangle_m)) * np.linalg.norm(offset_m, axis=1)
+        reached = own | (met.object_index == NOTHING) | (short_m <= REACHED_M)
+        return Reach(reached, met.object_index, met.face, short_m)
 
 
 def _along(
@@ -132,7 +159,7 @@ def verify_deep(files: SequenceFiles, scene: DeepScene, bounds: AuditConfig, fra
         bounds: shares that must agree, and how closely depth must.
         frames: how many frames are looked at, at even distances.
     """
-    rays = _Rays(scene)
+    rays = SceneRays(scene)
     depth, objects, sight = _Share(), _Share(), _Share()
     total = len(files.arrays["tracks_xyz.npy"])
     for frame in np.unique(np.linspace(0, total - 1, frames).round().astype(int)).tolist():
@@ -162,7 +189,7 @@ def verify_deep(files: SequenceFiles, scene: DeepScene, bounds: AuditConfig, fra
 
 
 def _predict(
-    files: SequenceFiles, rays: _Rays, view: str, frame: int
+    files: SequenceFiles, rays: SceneRays, view: str, frame: int
 ) -> tuple[Float64[np.ndarray, "H W"], Int64[np.ndarray, "H W"]]:
     """Depth (0: nothing) and object at each pixel centre."""
     intrinsics, pose = files.of_view(int(view), "intrinsics.npy"), files.of_view(int(view), "extrinsics_w2c.npy")[frame]
@@ -197,7 +224,7 @@ def _neighbours(values: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _evidence(
-    files: SequenceFiles, rays: _Rays, view: str, frame: int, owner: Int64[np.ndarray, "H W"]
+    files: SequenceFiles, rays: SceneRays, view: str, frame: int, owner: Int64[np.ndarray, "H W"]
 ) -> tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]:
     """Where the ray from the camera reaches a track on the image, and where rays of the four pixel centres around
     meet its object."""
@@ -212,17 +239,12 @@ def _evidence(
         inside &= np.abs(seen[:, 1] - (height - 1) / 2) < height / 2
     chosen = np.flatnonzero(inside)
     eye_m = camera_centre_m(pose)
-    offset_m = point_m[chosen] - eye_m
-    met = rays.meet(frame, eye_m, offset_m)
-    own = (met.object_index == np.asarray(table["object_index"])[chosen]) & (
-        met.face == np.asarray(table["face"])[chosen]
-    )
-    short_m = (1.0 - _along(eye_m, offset_m, met.triangle_m)) * np.linalg.norm(offset_m, axis=1)
+    object_index, face = (np.asarray(table[name], np.int64)[chosen] for name in ("object_index", "face"))
     reached, shown = np.zeros(len(point_m), bool), np.zeros(len(point_m), bool)
-    reached[chosen] = own | (met.object_index == NOTHING) | (short_m <= REACHED_M)
+    reached[chosen] = rays.reach(frame, eye_m, point_m[chosen], object_index, face).reached
     corner = np.floor(seen[chosen, :2]).astype(np.int64)[:, None] + AROUND
     on_image = ((corner >= 0) & (corner < [width, height])).all(axis=2)
     column, row = np.clip(corner[..., 0], 0, width - 1), np.clip(corner[..., 1], 0, height - 1)
-    own_object = owner[row, column] == np.asarray(table["object_index"])[chosen][:, None]
+    own_object = owner[row, column] == object_index[:, None]
     shown[chosen] = (own_object & on_image).any(axis=1)
     return reached, shown
