@@ -41,6 +41,9 @@ _WHITE = 0.95
 _LEAST_ROUGHNESS = (0.35, 0.62)
 # The part of a shoe by whose length heel and ball are placed: heels of shoes may stand higher than soles.
 _FOOT_M = 0.06
+# How far along a shoe its heel and ball reach, and over which height the levelling of soles fades.
+_NEAR_M, _STIFF_M, _FADE_M = 0.025, 0.04, 0.10
+_LEVEL_PASSES = 4
 _HEEL_SHARE, _TOE_SHARE = 0.04, 0.84
 # Hair under a hat ends so far above the hat's lowest edge.
 _BRIM_M = 0.02
@@ -161,20 +164,39 @@ def _with_stiff_soles(shoes: Piece) -> Piece:
     return replace(shoes, weights=weights)
 
 
+def _heel_and_toe_x_m(side_m: Float64[np.ndarray, "P 3"]) -> tuple[float, float]:
+    """Where along one shoe its heel and its ball stand."""
+    low = side_m[side_m[:, 2] < float(side_m[:, 2].min()) + _FOOT_M]
+    start, length = float(low[:, 0].min()), float(np.ptp(low[:, 0]))
+    return start + _HEEL_SHARE * length, start + _TOE_SHARE * length
+
+
+def _levelled(shoes: Piece) -> Piece:
+    """Shoes whose heels and balls reach the floor: MakeHuman's feet point a little down, and raise the heels."""
+    vertices_m = shoes.vertices_m.copy()
+    for here in (vertices_m[:, 1] > 0.0, vertices_m[:, 1] <= 0.0):
+        for _ in range(_LEVEL_PASSES):
+            side = vertices_m[here]
+            places = _heel_and_toe_x_m(side)
+            floor_m = float(side[:, 2].min())
+            raised = [float(side[np.abs(side[:, 0] - x) < _NEAR_M, 2].min()) - floor_m for x in places]
+            slope = (raised[1] - raised[0]) / (places[1] - places[0])
+            above = np.clip(1.0 - (side[:, 2] - floor_m - _STIFF_M) / _FADE_M, 0.0, 1.0)
+            vertices_m[here, 2] -= above * (raised[0] + slope * (side[:, 0] - places[0]))
+        vertices_m[here, 2] -= float(vertices_m[here, 2].min()) - float(shoes.vertices_m[here, 2].min())
+    return replace(shoes, vertices_m=vertices_m)
+
+
 def _footing(shoes: Piece) -> Footing:
-    """Heels and balls of a pair of shoes: middles of the sole at the back and towards the front."""
-    used = np.unique(shoes.parts[0].faces)
-    points = shoes.vertices_m[used]
-    floor_m = float(points[:, 2].min())
+    """Heels and balls of a pair of shoes, in the middle of the soles."""
+    floor_m = float(shoes.vertices_m[:, 2].min())
     heels: list[np.ndarray] = []
     toes: list[np.ndarray] = []
-    for sign in (1.0, -1.0):
-        side = points[sign * points[:, 1] > 0.0]
-        low = side[side[:, 2] < floor_m + _FOOT_M]
-        start, length = float(low[:, 0].min()), float(np.ptp(low[:, 0]))
-        for found, share in ((heels, _HEEL_SHARE), (toes, _TOE_SHARE)):
-            near = low[np.abs(low[:, 0] - start - share * length) < 0.08 * length]
-            found.append(np.array([start + share * length, near[:, 1].mean(), floor_m]))
+    for here in (shoes.vertices_m[:, 1] > 0.0, shoes.vertices_m[:, 1] <= 0.0):
+        side = shoes.vertices_m[here]
+        for found, x in zip((heels, toes), _heel_and_toe_x_m(side), strict=True):
+            near = side[(np.abs(side[:, 0] - x) < _NEAR_M) & (side[:, 2] < floor_m + _STIFF_M)]
+            found.append(np.array([x, near[:, 1].mean(), floor_m]))
     return Footing(np.stack(heels), np.stack(toes), floor_m)
 
 
@@ -227,7 +249,7 @@ def wear(wearer: Wearer, person: Person, actor: int, config: ClothingConfig, see
     rng = seed.stream("cloth", actor)
     pieces, hidden = _layers(chosen, wearer, wardrobe, rng)
     if "shoes" in pieces:
-        pieces["shoes"] = _with_stiff_soles(pieces["shoes"])
+        pieces["shoes"] = _with_stiff_soles(_levelled(pieces["shoes"]))
         footing = _footing(pieces["shoes"])
     else:
         pieces["shoes"], footing = make_shoes(wearer, person.outfit.shoes, rng)
