@@ -71,7 +71,7 @@ def read_sequence(folder: Path) -> Sequence:
     names = view_names(folder)
     if not names:
         raise SequenceFormatError(f"'{folder}' has no view: folders 0, 1, 2, ... are required")
-    return Sequence(folder, tracks_m, queries, tuple(_read_view(folder, name, frames, count) for name in names))
+    return Sequence(folder, tracks_m, queries, tuple(read_view(folder, name, frames, count) for name in names))
 
 
 def view_names(folder: Path) -> list[str]:
@@ -87,7 +87,12 @@ def view_names(folder: Path) -> list[str]:
     return found
 
 
-def _read_view(folder: Path, name: str, frames: int, count: int) -> SequenceView:
+def read_view(folder: Path, name: str, frames: int, count: int) -> SequenceView:
+    """One view of a sequence of ``frames`` frames and ``count`` tracks.
+
+    Raises:
+        SequenceFormatError: a file is missing, damaged, or not of the layout's type and shape.
+    """
     jpeg = read_byte_arrays(_inside(folder, f"{name}/{layout.IMAGES}"))
     if len(jpeg) != frames:
         raise SequenceFormatError(f"'{folder / name / layout.IMAGES}' has {len(jpeg)} frames; {frames} are required")

@@ -12,7 +12,13 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "perpetua"
 SCRIPTS = ROOT / "blender_scripts"
 
-TORCH_MODULES = ("perpetua/optimisation.py", "perpetua/actors/", "perpetua/cameras/", "perpetua/doctor.py")
+TORCH_MODULES = (
+    "perpetua/optimisation.py",
+    "perpetua/actors/",
+    "perpetua/cameras/",
+    "perpetua/doctor.py",
+    "perpetua/formats/torch_dataset.py",
+)
 OPTIONAL = {"submitit": "perpetua/cluster/", "rerun": "perpetua/formats/"}
 
 
