@@ -19,6 +19,7 @@ from perpetua.rooms.procedural import ProceduralRooms
 from perpetua.rooms.procedural.plan import EXTRAS, Box, FloorPlan, RoomPlan
 from perpetua.rooms.procedural.sampling import sample_floor, sample_room
 from perpetua.rooms.source import RoomWish
+from perpetua.rooms.support import find_faults
 from perpetua.rooms.types import PATTERNS, Room
 from perpetua.seeding import StageSeed
 
@@ -239,3 +240,12 @@ def test_room_too_small_for_its_furniture_is_rejected() -> None:
     with pytest.raises(RoomRejected, match="does not fit"):
         tiny = RoomWish("diningroom", (2.7, 2.7, 2.6), "day", True)
         ProceduralRooms().make(tiny, CONFIG, StageSeed(0, 0, "room"), 0, Path())
+
+
+def test_a_bench_whose_feet_lie_in_the_plane_of_the_floor_stands() -> None:
+    """Rays that see one of two surfaces at one place once found this bench hanging."""
+    wish = RoomWish("bathroom", (5.66, 5.43, 2.64), "evening", True)
+    room = ProceduralRooms().make(wish, CONFIG, StageSeed(8, 3, "room"), 0, Path())
+    benches = [thing for thing in room.objects if thing.category == "bench"]
+    assert benches and min(thing.mesh.vertices_m[:, 2].min() for thing in benches) == 0.0
+    assert find_faults(room.objects) == ()

@@ -150,13 +150,6 @@ def test_what_stands_within_three_centimetres_is_no_fault(gap_m: float) -> None:
     assert _faults(_table(10, lift_m=gap_m)) == []
 
 
-def test_feet_in_the_plane_of_the_floor_stand() -> None:
-    """Rays see one of two surfaces at one place, and which of them is chance."""
-    places = [(x, y) for x in (-1.8, -1.1, -0.4, 0.3, 1.0) for y in (-1.8, -1.0, -0.2, 0.6)]
-    benches = [_thing(10 + k, "bench", _box((x, y, 0.0), (x + 0.37, y + 0.31, 0.3))) for k, (x, y) in enumerate(places)]
-    assert _faults(*benches) == []
-
-
 def test_what_floats_is_found_with_its_drop() -> None:
     assert _faults(_table(10, lift_m=0.04)) == [("table_10", True, 0.04)]
     cup = _thing(11, "cup", _box((0.3, 0.3, 0.74), (0.38, 0.38, 0.84)))
