@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from perpetua.actors.assembly import draw_bodies
 from perpetua.actors.bodies.makehuman import base_mesh
 from perpetua.actors.bodies.rig import base_weights
+from perpetua.actors.bodies.source import Body
 from perpetua.actors.clothing.makehuman_clothes import bound_weights, fitted
 from perpetua.actors.clothing.mhclo import read_binding, read_mesh
 from perpetua.actors.clothing.mhmat import load_look, read_material, without_transparent
@@ -182,9 +183,21 @@ def test_people_wear_what_suits_them(folder: Path) -> None:
         assert hair.uv[..., 0].min() > 0.4, "the transparent half is gone"
         sole_m = body.skeleton.contact_m
         assert np.allclose(sole_m[:, 2], 0.0, atol=1e-9) and 0.10 < sole_m[1, 0] - sole_m[0, 0] < 0.32
+        assert max(_sole_gaps_m(body)) < 0.008, "soles are level"
         still = _t_pose(body.skeleton.joint_m)
         assert body.pose(still).tobytes() == same.pose(still).tobytes()
         assert abs(float(body.pose(still)[0, :, 2].min())) < 0.002
+
+
+def _sole_gaps_m(body: Body) -> list[float]:
+    """How high the shoes are over the floor at heels and balls, standing."""
+    posed = body.pose(_t_pose(body.skeleton.joint_m))[0]
+    shoes = posed[np.unique(next(part.faces for part in body.parts if part.name == "shoes"))]
+    gaps = []
+    for contact_m in body.skeleton.contact_m:
+        near = np.linalg.norm(shoes[:, :2] - contact_m[:2], axis=1) < 0.03
+        gaps.append(float(shoes[near, 2].min()))
+    return gaps
 
 
 def _t_pose(joint_m: np.ndarray) -> BodyMotion:
@@ -264,4 +277,5 @@ def test_a_real_folder_dresses_people() -> None:
         hips = (centre[:, 2] > joint_m[1, 2] - 0.1) & (centre[:, 2] < joint_m[BODY_JOINTS.index("spine1"), 2])
         assert not np.any(hips & (np.abs(centre[:, 1]) < 0.15)), "skin shows at the hips"
         assert not np.any(centre[:, 2] < 0.02), "a foot shows"
+        assert max(_sole_gaps_m(body)) < 0.008, "soles are level"
         assert abs(float(posed[:, 2].min())) < 0.002 and 1.4 < posed[:, 2].max() < 2.2
