@@ -1,88 +1,36 @@
-"""How bodies keep to the floor, to their routes, and out of everything: 40 routes over ten rooms, and what it costs.
+"""How bodies keep to the floor, to their routes, and out of everything, and what it costs: for the rooms of a run.
 
-    python benchmarks/motion.py --bank FOLDER_OF_STORED_ROOMS --cache FOLDER
+    perpetua generate --preset benchmark --seed 7 --rooms 10 --until actors --out plans
+    python benchmarks/motion.py plans
 
-Soles are measured here on the vertices of the shoes against the triangles of the floor, by code of its own; depths come
-from the check that guards the stage (``perpetua.actors.penetration``), on every other frame with more vertices.
-Half of the rooms are procedural, half are read from a folder with ``*/10_room`` stages. Routes are planned once and
-kept in the cache.
+Soles are measured here on the vertices of the shoes against the triangles of the floor, by code of its own. Depth in
+the scene, overlap and path error are the stage's own figures, of every frame.
 """
 
 import argparse
-import pickle
-import resource
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from perpetua.actors.assembly import assemble_actors, draw_bodies, measured_skeletons
-from perpetua.actors.bodies.source import Body
-from perpetua.actors.config import ValidationConfig
-from perpetua.actors.motion.kinematics import joint_positions
-from perpetua.actors.motion.plan import make_motions
-from perpetua.actors.penetration import make_floor, make_obstacles, make_probe, scene_depth
-from perpetua.actors.routes import plan_routes
-from perpetua.actors.types import ActorMesh, BodyMotion, Route, Skeleton
-from perpetua.actors.validation import check_limits, validate_actors
-from perpetua.config import Config
-from perpetua.errors import ActorError
+from perpetua.actors.penetration import make_floor
+from perpetua.actors.types import ActorMesh, BodyMotion
+from perpetua.files import read_json
 from perpetua.geometry.raycast import Caster
-from perpetua.navigation.grid import build_nav_grid
 from perpetua.pipeline.codec import load
-from perpetua.rooms.build import build_room
-from perpetua.rooms.types import Room
-from perpetua.seeding import StageSeed
+from perpetua.pipeline.layout import read_run
 
-FRAMES = 240
-SEED = 11
 # The underside of a sole is this thick.
 SOLE_M = 0.012
 
 
 @dataclass(frozen=True)
-class Figures:
-    """One actor's figures; sole figures over contact frames."""
+class Soles:
+    """One actor's soles over its contact frames."""
 
     slide_mps: np.ndarray
     sunk_m: np.ndarray
     floating_m: np.ndarray
-    scene: str
-    scene_m: float
-    path_m: float
-
-
-def rooms_of(bank: Path | None, count: int, cache: Path) -> list[Room]:
-    """Stored rooms first, procedural ones after."""
-    config = Config()
-    folders = sorted(bank.glob("*/10_room"))[: count // 2] if bank is not None else []
-    rooms: list[Room] = [load(folder) for folder in folders]
-    procedural = config.rooms.model_copy(update={"source": "procedural"})
-    for index in range(count - len(rooms)):
-        rooms.append(build_room(procedural, config.navigation, StageSeed(SEED, index, "room"), cache))
-    return rooms
-
-
-def routes_in(room: Room, index: int, cache: Path) -> tuple[Route, ...]:
-    """Routes of four actors, planned once."""
-    path = cache / f"routes_{index}_{room.name}.pickle"
-    if not path.exists():
-        config = Config()
-        grid = build_nav_grid(room, config.navigation)
-        seed = StageSeed(SEED, index, "routes")
-        path.write_bytes(pickle.dumps(plan_routes(room, grid, config.actors, FRAMES, config.sequence.fps, seed)))
-    routes: tuple[Route, ...] = pickle.loads(path.read_bytes())
-    return routes
-
-
-def bodies_for(cache: Path) -> tuple[Body, ...]:
-    """The same four people in every room, made once."""
-    path = cache / "bodies.pickle"
-    if not path.exists():
-        path.write_bytes(pickle.dumps(draw_bodies(Config().actors, StageSeed(SEED, 0, "bodies"))))
-    bodies: tuple[Body, ...] = pickle.loads(path.read_bytes())
-    return bodies
 
 
 def sole_ends(mesh: ActorMesh, motion: BodyMotion) -> list[np.ndarray]:
@@ -100,9 +48,7 @@ def sole_ends(mesh: ActorMesh, motion: BodyMotion) -> list[np.ndarray]:
     return ends
 
 
-def sole_figures(
-    mesh: ActorMesh, motion: BodyMotion, floor: Caster, fps: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def measure_soles(mesh: ActorMesh, motion: BodyMotion, floor: Caster, fps: float) -> Soles:
     """Slide, depth in the floor and height above it of each foot's heel and toe while it is in contact."""
     slides, heights = [], []
     for contact, end in enumerate(sole_ends(mesh, motion)):
@@ -113,7 +59,7 @@ def sole_figures(
         height_m = np.stack([height_over(floor, zone_m[:, vertex]) for vertex in range(zone_m.shape[1])], axis=1)
         heights.append(height_m.min(axis=1)[stands])
     height_m = np.concatenate(heights)
-    return np.concatenate(slides), np.maximum(-height_m, 0.0), np.maximum(height_m, 0.0)
+    return Soles(np.concatenate(slides), np.maximum(-height_m, 0.0), np.maximum(height_m, 0.0))
 
 
 def height_over(floor: Caster, point_m: np.ndarray) -> np.ndarray:
@@ -123,99 +69,62 @@ def height_over(floor: Caster, point_m: np.ndarray) -> np.ndarray:
     return np.where(hits.hit, hits.distance_m - 0.12, 0.0)
 
 
-def figures_of(
-    mesh: ActorMesh, motion: BodyMotion, skeleton: Skeleton, route: Route, room: Room, floor: Caster, fps: float
-) -> Figures:
-    """All figures of one actor."""
-    slide_mps, sunk_m, floating_m = sole_figures(mesh, motion, floor, fps)
-    frames = np.arange(0, len(route.heading_rad), 2)
-    joint_m = joint_positions(motion, skeleton)
-    obstacles = make_obstacles(room, float(route.position_m[:, 2].min()) + 0.1)
-    worst = scene_depth(mesh, joint_m, make_probe(mesh, joint_m, frames, 4000), obstacles, frames)
-    away_m = np.linalg.norm(motion.pelvis_m[:, :2] - route.position_m[:, :2], axis=1)
-    for dwell in route.dwells:
-        if dwell.purpose == "sit":
-            away_m[dwell.first_frame : dwell.last_frame + 1] = 0.0
-    return Figures(slide_mps, sunk_m, floating_m, f"{worst.place} at {worst.frame}", worst.value_m, float(away_m.max()))
+def measure_room(folder: Path, fps: float) -> list[Soles]:
+    """Prints a line per actor of a room."""
+    floor = make_floor(load(folder / "10_room"))
+    routes, motions, actors = (load(folder / name) for name in ("30_routes", "40_motion", "50_actors"))
+    stage = read_json(folder / "50_actors" / "validation.json")
+    soles = []
+    for route, motion, actor, figures in zip(routes, motions, actors, stage["actors"], strict=True):
+        found = measure_soles(actor, motion, floor, fps)
+        soles.append(found)
+        middle, high = (np.percentile(found.slide_mps, share) * 100 for share in (50, 95))
+        sunk_mm, floating_mm = (np.percentile(height_m, 99) * 1000 for height_m in (found.sunk_m, found.floating_m))
+        print(
+            f"| {folder.name} {actor.actor} | {route.description} | {middle:.2f} | {high:.2f} | {sunk_mm:.1f} | "
+            f"{floating_mm:.1f} | {figures['scene_depth']['value_m'] * 100:.1f} | "
+            f"{figures['path_error']['value_m'] * 100:.1f} |",
+            flush=True,
+        )
+    return soles
 
 
-def wide_limits() -> ValidationConfig:
-    """Limits that nothing breaks, to have every figure."""
-    names = [name for name in ValidationConfig.model_fields if name.startswith("max_")]
-    return ValidationConfig(**{name: 0.2 if "sole" in name or "floating" in name else 1.0 for name in names})
-
-
-def print_actor(room: Room, place: int, route: Route, figures: Figures) -> None:
-    """One line."""
-    middle, high = (np.percentile(figures.slide_mps, share) * 100 for share in (50, 95))
-    sunk_mm, floating_mm = (np.percentile(height_m, 99) * 1000 for height_m in (figures.sunk_m, figures.floating_m))
-    print(
-        f"{room.name:20.20} {place} {route.description:36.36} slide {middle:4.2f} {high:4.2f} cm/s sunk {sunk_mm:5.1f} "
-        f"floating {floating_mm:5.1f} mm  scene {figures.scene_m * 100:5.1f} cm {figures.scene:34.34} "
-        f"path {figures.path_m * 100:5.1f} cm",
-        flush=True,
-    )
-
-
-def print_summary(everything: list[Figures], overlaps: list[tuple[float, str, tuple[int, int]]]) -> None:
-    """What the forty have in common."""
-    slide_mps = np.concatenate([figures.slide_mps for figures in everything])
-    sunk = np.mean(np.concatenate([figures.sunk_m for figures in everything]) < 0.01)
-    floating = np.mean(np.concatenate([figures.floating_m for figures in everything]) < 0.015)
+def print_summary(rooms: list[Path], soles: list[Soles]) -> None:
+    """What all have in common."""
+    stages = [read_json(room / "50_actors" / "validation.json") for room in rooms]
+    slide_mps = np.concatenate([found.slide_mps for found in soles])
+    sunk = np.mean(np.concatenate([found.sunk_m for found in soles]) < 0.01)
+    floating = np.mean(np.concatenate([found.floating_m for found in soles]) < 0.015)
     middle, high = (np.percentile(slide_mps, share) * 100 for share in (50, 95))
-    deep = sum(figures.scene_m > 0.02 for figures in everything)
-    print(f"\n{len(everything)} actors; slide: median {middle:.2f}, 95th percentile {high:.2f} cm/s")
+    people = [actor for stage in stages for actor in stage["actors"]]
+    nearest_m = min(pair["least_distance_m"] for stage in stages for pair in stage["pairs"])
+    print(f"\n{len(people)} actors; slide in contact: median {middle:.2f}, 95th percentile {high:.2f} cm/s")
     print(f"share of contact frames sunk under 1 cm {sunk:.4f}, floating under 1.5 cm {floating:.4f}")
-    print(
-        f"deepest in the scene {max(figures.scene_m for figures in everything) * 100:.1f} cm; deeper than 2 cm: {deep}"
-    )
-    print(f"path error {max(figures.path_m for figures in everything) * 100:.1f} cm")
-    print(f"pairs that intersect: {sum(gap_m < 0.0 for gap_m, _, _ in overlaps)}; nearest {min(overlaps)}")
+    print(f"deepest in the scene {max(actor['scene_depth']['value_m'] for actor in people) * 100:.1f} cm")
+    print(f"nearest two actors come {nearest_m * 100:.1f} cm (below 0: they intersect)")
+    print(f"largest path error {max(actor['path_error']['value_m'] for actor in people) * 100:.1f} cm")
+    for name in ("40_motion", "50_actors"):
+        manifests = [read_json(room / name / "manifest.json") for room in rooms]
+        seconds, peak_mb = ([manifest[key] for manifest in manifests] for key in ("seconds", "peak_memory_mb"))
+        print(f"{name}: median {np.median(seconds):.1f} s, most {max(seconds):.1f} s, {max(peak_mb):.0f} MB")
 
 
 def main() -> None:
     """Prints a line per actor and the summary."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--bank", type=Path)
-    parser.add_argument("--cache", type=Path, required=True)
-    parser.add_argument("--rooms", type=int, nargs="*", help="only these of the ten")
-    arguments = parser.parse_args()
-    arguments.cache.mkdir(parents=True, exist_ok=True)
-    config = Config()
-    fps, limits = config.sequence.fps, config.actors.validation
-    bodies = bodies_for(arguments.cache)
-    everything: list[Figures] = []
-    costs, refused, overlaps = [], [], []
-    for index, room in enumerate(rooms_of(arguments.bank, 10, arguments.cache)):
-        if arguments.rooms is not None and index not in arguments.rooms:
-            continue
-        routes = routes_in(room, index, arguments.cache)
-        times_s = [time.process_time()]
-        skeletons = measured_skeletons(bodies)
-        motions = make_motions(routes, skeletons, room, fps, config.actors.motion, StageSeed(SEED, index, "motion"))
-        times_s.append(time.process_time())
-        meshes = assemble_actors(bodies, motions, room.next_object_index)
-        times_s.append(time.process_time())
-        report = validate_actors(meshes, motions, skeletons, routes, room, fps, wide_limits())
-        times_s.append(time.process_time())
-        costs.append(np.diff(times_s))
-        overlaps += [(float(pair.distance_m.min()), room.name, pair.actors) for pair in report.pairs]
-        floor = make_floor(room)
-        for place, route in enumerate(routes):
-            figures = figures_of(meshes[place], motions[place], skeletons[place], route, room, floor, fps)
-            everything.append(figures)
-            print_actor(room, place, route, figures)
-        try:
-            check_limits(report, limits)
-        except ActorError as error:
-            refused.append(f"{room.name}: {error}")
-        hands_cm = [f"{figures.hands_in_trunk.value_m * 100:.1f}" for figures in report.actors]
-        joints = [f"{figures.joint_excess_rad:.2f} {figures.joint_excess_at}" for figures in report.actors]
-        print("   CPU s: motion {:.1f}, posing {:.1f}, checks {:.1f}".format(*costs[-1]), hands_cm, joints, flush=True)
-    print_summary(everything, overlaps)
-    print("CPU s for four actors: motion {:.1f}, posing {:.1f}, checks {:.1f}".format(*np.mean(costs, axis=0)))
-    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
-    print(f"rooms refused by the stage's limits: {len(refused)}", *refused, sep="\n  ")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", type=Path, help="output folders of perpetua generate")
+    print(
+        "| actor | does | slide: median cm/s | 95th | sunk: 99th mm | floating: 99th mm | in the scene cm | path cm |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    rooms, soles = [], []
+    for out in parser.parse_args().folders:
+        fps = read_run(out).config.sequence.fps
+        for folder in sorted((out / ".work").iterdir()):
+            if (folder / "50_actors" / "manifest.json").exists():
+                rooms.append(folder)
+                soles += measure_room(folder, fps)
+    print_summary(rooms, soles)
 
 
 if __name__ == "__main__":
