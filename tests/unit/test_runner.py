@@ -122,7 +122,9 @@ def test_failure_is_recorded_and_forgotten_when_mended(tmp_path: Path) -> None:
     with pytest.raises(AuditError):
         _run(tmp_path, ran, fail="export")
     layout = OutputLayout(tmp_path, Config().export, 7, 0)
-    assert json.loads(layout.failure_file.read_text()) == {"stage": "export", "reason": "export does not work out"}
+    assert json.loads(layout.failure_file.read_text()) == {
+        "stage": "export", "reason": "export does not work out", "exit_code": 1,
+    }  # fmt: skip
     _run(tmp_path, ran)
     assert not layout.failure_file.exists()
     assert ran["room"] == 1
