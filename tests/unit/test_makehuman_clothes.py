@@ -12,6 +12,7 @@ from perpetua.actors.assembly import draw_bodies
 from perpetua.actors.bodies.makehuman import base_mesh
 from perpetua.actors.bodies.rig import base_weights
 from perpetua.actors.bodies.source import Body
+from perpetua.actors.bodies.user_files import body_listing
 from perpetua.actors.clothing.makehuman_clothes import bound_weights, fitted
 from perpetua.actors.clothing.mhclo import read_binding, read_mesh
 from perpetua.actors.clothing.mhmat import load_look, read_material, without_transparent
@@ -231,6 +232,24 @@ def test_a_folder_that_dresses_nobody_is_refused(tmp_path: Path) -> None:
     write_garment(tmp_path / "clothes", "male_suit", quads_of("helper-tights", -0.7, 0.5))
     with pytest.raises(AssetError, match="for women, and there is none"):
         choose_clothes(load_wardrobe(tmp_path), True, 0, np.random.default_rng(0))
+
+
+def test_changed_files_change_what_bodies_are_made_from(tmp_path: Path) -> None:
+    write_garment(tmp_path / "clothes", "suit", quads_of("helper-tights", -0.7, 0.5))
+    config = config_of(tmp_path, 1)
+    before = body_listing(config)
+    assert len(before) == 3 and body_listing(ActorsConfig()) == []
+    write_texture(tmp_path / "clothes" / "suit" / "suit_diffuse.png", (1, 2, 3))
+    assert body_listing(config) != before
+
+
+def test_authors_names_may_be_in_any_encoding(tmp_path: Path) -> None:
+    path = write_binding(tmp_path, "obj_file t.obj\nverts 0\n17\n")
+    path.write_bytes(b"author Jos\xe9\n" + path.read_bytes())
+    assert read_binding(path, tmp_path).base_vertices.tolist() == [[17, 17, 17]]
+    path.write_bytes(b"\x00\xff\xfe")
+    with pytest.raises(AssetError, match="must have a line obj_file"):
+        read_binding(path, tmp_path)
 
 
 def test_mesh_and_binding_must_agree(tmp_path: Path) -> None:

@@ -82,15 +82,17 @@ def within(root: Path, path: Path, name: str, line: int) -> Path:
 def text_lines(path: Path) -> Iterator[tuple[int, str, str]]:
     """Number, first word and rest of each line that is not empty and no comment.
 
+    Authors' names may be in any encoding, so bytes that are not UTF-8 are replaced.
+
     Raises:
-        AssetError: the file is missing, too large or not text.
+        AssetError: the file is missing or too large.
     """
     try:
         if path.stat().st_size > _MOST_BYTES:
             raise AssetError(f"'{path}' must be no larger than {_MOST_BYTES >> 20} MiB: take it out of the folder")
-        content = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise AssetError(f"'{path}' must be a text file that can be read: {error}") from None
+        content = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise AssetError(f"'{path}' must be a file that can be read: {error}") from None
     for number, line in enumerate(content.splitlines(), start=1):
         words = line.strip()
         if words and not words.startswith(("#", "//")):
