@@ -273,7 +273,7 @@ def main() -> None:
         score(Subject.load(folder), arguments.frames, ledger)
     _print_tables(ledger)
     if arguments.sheet is not None:
-        rows = {f"{rule}\n{kind}": ledger.examples[rule, kind] for rule, kind in ledger.in_order()}
+        rows = {f"{r}, {ledger.kinds[r, kind]} of\n{kind}": ledger.examples[r, kind] for r, kind in ledger.in_order()}
         write_sheet(rows, arguments.sheet)
         print(f"\nwrote {arguments.sheet}")
 

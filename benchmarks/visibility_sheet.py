@@ -11,7 +11,8 @@ from perpetua.formats.reader import Sequence, read_sequence
 
 REACH_PX, ENLARGE = 8, 9
 LABEL_PX, CAPTION_PX, GAP_PX = 250, 18, 8
-MARK = (255, 60, 60)
+# Neither rooms nor the colours of depth have it.
+MARK = (60, 255, 200)
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,8 @@ def _pictures(sequence: Sequence, example: Example) -> list[Image.Image]:
     pictures = []
     for picture in colours:
         canvas = Canvas(np.ascontiguousarray(picture.repeat(ENLARGE, axis=0).repeat(ENLARGE, axis=1)))
-        canvas.dot(at_px, MARK, 0.45 * ENLARGE, hollow=True)
-        canvas.dot(at_px, MARK, 1.2)
+        canvas.dot(at_px, MARK, 0.55 * ENLARGE, hollow=True)
+        canvas.dot(at_px, MARK, 1.6)
         pictures.append(canvas.picture())
     return pictures
 

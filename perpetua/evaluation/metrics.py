@@ -123,10 +123,10 @@ def are_given(points: Float[np.ndarray, "*batch 3"]) -> Bool[np.ndarray, "*batch
 def median_scale(true_m: Float[np.ndarray, "N 3"], predicted_m: Float[np.ndarray, "N 3"]) -> float:
     """The factor that makes the median distance of predicted points from the origin that of the true ones.
 
-    Points whose prediction is missing are left out on both sides. Without any, or where all predictions lie on the
+    Points that are missing on one side are left out on both. Without any, or where all predictions lie on the
     origin, there is nothing to scale by, and the factor is 1.
     """
-    given = are_given(predicted_m)
+    given = are_given(predicted_m) & are_given(true_m)
     if not given.any():
         return 1.0
     true_distance_m = np.median(np.linalg.norm(np.asarray(true_m[given], np.float64), axis=1))

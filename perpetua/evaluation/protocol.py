@@ -100,11 +100,13 @@ class Truth:
 
     def world_pixel_m(self) -> float:
         """How wide one pixel is at the median query: the median of Z / f, metres."""
+        query_m = self.sequence.tracks_m[self.query_frame, np.arange(self.size.tracks)].astype(np.float64)
         width_m = np.empty(self.size.tracks)
-        for view in range(self.size.views):
-            chosen = np.flatnonzero(self.query_view == view)
-            depth_m = self.in_camera(view)[self.query_frame[chosen], chosen, 2]
-            width_m[chosen] = depth_m / self.focal_px(view)
+        for number, view in enumerate(self.sequence.views):
+            chosen = np.flatnonzero(self.query_view == number)
+            camera_from_world = view.camera_from_world[self.query_frame[chosen]].astype(np.float64)
+            depth_m = transform_points(camera_from_world, query_m[chosen, None])[:, 0, 2]
+            width_m[chosen] = depth_m / self.focal_px(number)
         return float(np.median(width_m))
 
 
@@ -155,9 +157,9 @@ def _tally_views(
         scales.append(median_scale(true_m[frame, chosen], predicted[frame, chosen]))
         pixel_m = np.abs(true_m[..., 2]) / truth.focal_px(view)
         entries = {QUERY_VIEW: scored & queried, OTHER_VIEWS: np.broadcast_to(~queried, scored.shape)}
+        visible = np.asarray(truth.sequence.views[view].visible)
+        scaled_m = scales[-1] * predicted.astype(np.float64)
         for regime, counted in entries.items():
-            visible = np.asarray(truth.sequence.views[view].visible)
-            scaled_m = scales[-1] * predicted.astype(np.float64)
             tally = tally_entries(true_m, visible, scaled_m, predictions.visible[view], pixel_m, counted)
             tallies[regime] = tallies[regime] + tally if regime in tallies else tally
     return tuple(scales)
