@@ -129,12 +129,12 @@ def _sdk() -> Any:
 
 def _tracks_by_object(source: ExportSource) -> dict[str, Int64[np.ndarray, " _"]]:
     """Tracks of each object under a name that can be part of an entity path."""
-    return {
-        re.sub(r"[^A-Za-z0-9_-]", "_", source.object_name.get(index, f"object_{index}")): np.flatnonzero(
-            source.track_object == index
-        )
-        for index in np.unique(source.track_object).tolist()
-    }
+    groups: dict[str, Int64[np.ndarray, " _"]] = {}
+    for index in np.unique(source.track_object).tolist():
+        name = re.sub(r"[^A-Za-z0-9_-]", "_", source.object_name.get(index, f"object_{index}"))
+        unique = name if name not in groups else f"{name}_{index}"
+        groups[unique] = np.flatnonzero(source.track_object == index)
+    return groups
 
 
 def _track_colours(source: ExportSource) -> UInt8[np.ndarray, "P 3"]:

@@ -1,5 +1,6 @@
 """What an exporter is: it writes a finished sequence once more, in the layout of another reader."""
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -50,10 +51,16 @@ class ExportSource:
     @cached_property
     def track_object(self) -> Int64[np.ndarray, " P"]:
         """Object index of each track; without a record 1 if most pixels that show it are foreground, else 0."""
-        tracks = self.record.get("tracks")
-        if tracks is not None:
-            return np.array(tracks["object_index"], np.int64)
-        votes = np.zeros(self.sequence.tracks_m.shape[1], np.int64)
+        count = self.sequence.tracks_m.shape[1]
+        recorded = self.record.get("tracks", {}).get("object_index")
+        if recorded is not None:
+            if len(recorded) != count:
+                raise SequenceFormatError(
+                    f"sequence.json of '{self.sequence.folder}' names the objects of {len(recorded)} tracks and there "
+                    f"are {count}: take sequence.json away, or make the sequence again"
+                )
+            return np.array(recorded, np.int64)
+        votes = np.zeros(count, np.int64)
         for index, view in enumerate(self.sequence.views):
             if view.foreground is not None:
                 frame, track = np.nonzero(view.visible)
@@ -65,20 +72,21 @@ class ExportSource:
 
     @cached_property
     def object_name(self) -> dict[int, str]:
-        """Names of the objects in ``sequence.json``, by object index."""
-        things = self.record.get("objects", [])
-        return {
-            int(thing["object_index"]): str(thing.get("name", f"{thing['category']}_{thing['object_index']}"))
-            for thing in things
-        }
+        """Names of the objects in ``sequence.json``, by object index; a name that several share gets the index."""
+        named = {int(thing["object_index"]): str(thing.get("name", thing["category"])) for thing in self._objects}
+        shared = Counter(named.values())
+        return {index: name if shared[name] == 1 else f"{name}_{index}" for index, name in named.items()}
 
     @cached_property
     def people(self) -> frozenset[int]:
         """Object indices of the people; without a record 1, by the rule of ``track_object``."""
-        things = self.record.get("objects")
-        if things is None:
+        if not self._objects:
             return frozenset({1})
-        return frozenset(int(thing["object_index"]) for thing in things if thing["category"] == PERSON)
+        return frozenset(int(thing["object_index"]) for thing in self._objects if thing["category"] == PERSON)
+
+    @property
+    def _objects(self) -> list[dict[str, Any]]:
+        return list(self.record.get("objects", []))
 
     def depth_m(self, view: int, frame: int) -> Float32[np.ndarray, "H W"]:
         """Depth of a frame along Z, 0 for none.

@@ -188,6 +188,15 @@ def test_a_sequence_of_others_needs_no_record(made: tuple[Path, Scene, SequenceT
     assert 0 < people.sum() < len(people) and (ids == people).mean() > 0.98
 
 
+def test_a_record_of_other_tracks_is_refused(made: tuple[Path, Scene, SequenceTracks], tmp_path: Path) -> None:
+    copy = _copy(made[0], tmp_path / NAME)
+    record = json.loads((copy / "sequence.json").read_text())
+    record["tracks"]["object_index"].pop()
+    (copy / "sequence.json").write_text(json.dumps(record))
+    with pytest.raises(SequenceFormatError, match="objects of 199 tracks and there are 200"):
+        export_sequence(copy, "kubric", tmp_path / "out")
+
+
 def test_kubric_refuses_what_its_loader_would_read_wrong(
     made: tuple[Path, Scene, SequenceTracks], tmp_path: Path
 ) -> None:
@@ -255,7 +264,7 @@ def test_rerun_recording_is_read_back(made: tuple[Path, Scene, SequenceTracks], 
     recording = rerun.dataframe.load_recording(str(written))
     columns = {str(column.entity_path) for column in recording.schema().component_columns()}
     assert {f"/world/view_{view}/{what}" for view in range(VIEWS) for what in ("image", "depth")} <= columns
-    assert {"/world/tracks/person_5", "/world/tracks/crate_2", "/world/trails"} <= columns
+    assert {"/world/tracks/person_5", "/world/tracks/crate", "/world/trails"} <= columns
     table = recording.view(index="frame", contents="/world/tracks/person_5").select().read_all()
     assert table["frame"].to_pylist() == list(range(FRAMES))
     position = table["/world/tracks/person_5:Position3D"].to_pylist()
