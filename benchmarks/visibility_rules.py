@@ -14,6 +14,9 @@ depths in double precision; ``perpetua.audit.deep``, which shares no code with w
   most 1.05 times, and the point is within 5% of their median (``utils/gen_tracking_indoor.py`` of
   y-zheng18/point_odyssey); it does not look at objects.
 
+Points that a ray reaches and that no pixel around shows the object of (in no pixel) are hidden by the rule that a point
+is visible only where the image agrees; they get fewer as images get larger.
+
 The work area of the sequences must still be there. The sheet shows examples of what each rule still gets wrong.
 """
 
@@ -155,11 +158,13 @@ def _score_image(subject: Subject, rays: SceneRays, view: int, frame: int, ledge
     true = np.zeros(len(point_m), bool)
     true[tracks] = ends.reached
     shot = _shot(subject, view, frame, tracks, seen[tracks])
+    shown = np.zeros(len(point_m), bool)
+    shown[tracks] = (shot.around_object == shot.object_index[:, None]).any(axis=1)
     for rule, decide in RULES.items():
         # Only what is stored speaks of points off the image, and must call them hidden.
         found = np.asarray(files.of_view(view, "visibility.npy")[frame]) & (rule == "stored")
         found[tracks] = decide(shot)
-        _enter(ledger, rule, subject.moving, on_image, found, true)
+        _enter(ledger, rule, subject.moving, on_image, found, true, shown)
         wrong = np.flatnonzero(found[tracks] != ends.reached)
         for place, kind in zip(wrong.tolist(), _kinds(subject, frame, eye_m, tracks, ends, shot, wrong), strict=True):
             pixel_px = tuple(seen[tracks[place], :2].tolist())
@@ -173,6 +178,7 @@ def _enter(
     on_image: Bool[np.ndarray, " P"],
     found: Bool[np.ndarray, " P"],
     true: Bool[np.ndarray, " P"],
+    shown: Bool[np.ndarray, " P"],
 ) -> None:
     """Counts what a rule found in one image."""
     for group, members in {"all": np.ones(len(moving), bool), "static": ~moving, "moving": moving}.items():
@@ -181,6 +187,7 @@ def _enter(
             "on image": members & on_image,
             "wrongly visible": members & found & ~true,
             "wrongly hidden": members & ~found & true,
+            "unshown": members & ~found & true & ~shown,
         }
         ledger.enter(rule, group, {name: int(entries.sum()) for name, entries in of_group.items()})
 
@@ -244,17 +251,17 @@ def _kinds(
 
 
 def _print_tables(ledger: Ledger) -> None:
-    print("| rule | tracks | entries | on image | agreement | agreement on image | wrongly visible | wrongly hidden |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    headings = ("rule", "tracks", "entries", "on image", "agreement", "on image", "wrongly visible", "wrongly hidden")
+    print(f"| {' | '.join(headings)} | of these in no pixel |\n|{' --- |' * (len(headings) + 1)}")
     for rule in RULES:
         for group in GROUPS:
-            entries, inside, visible, hidden = (
+            entries, inside, visible, hidden, unshown = (
                 ledger.counts[rule, group, name]
-                for name in ("entries", "on image", "wrongly visible", "wrongly hidden")
+                for name in ("entries", "on image", "wrongly visible", "wrongly hidden", "unshown")
             )
             shares = (1.0 - (visible + hidden) / max(count, 1) for count in (entries, inside))
             agreement = " | ".join(f"{100 * share:.3f}%" for share in shares)
-            print(f"| {rule} | {group} | {entries} | {inside} | {agreement} | {visible} | {hidden} |")
+            print(f"| {rule} | {group} | {entries} | {inside} | {agreement} | {visible} | {hidden} | {unshown} |")
     print("\n| rule | kind of disagreement | entries |\n| --- | --- | --- |")
     for rule, kind in ledger.in_order():
         print(f"| {rule} | {kind} | {ledger.kinds[rule, kind]} |")
@@ -273,7 +280,9 @@ def main() -> None:
         score(Subject.load(folder), arguments.frames, ledger)
     _print_tables(ledger)
     if arguments.sheet is not None:
-        rows = {f"{r}, {ledger.kinds[r, kind]} of\n{kind}": ledger.examples[r, kind] for r, kind in ledger.in_order()}
+        rows = {
+            f"{r}: {ledger.kinds[r, kind]} entries\n{kind}": ledger.examples[r, kind] for r, kind in ledger.in_order()
+        }
         write_sheet(rows, arguments.sheet)
         print(f"\nwrote {arguments.sheet}")
 
