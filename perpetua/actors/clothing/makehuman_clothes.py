@@ -47,6 +47,8 @@ _LEVEL_PASSES = 4
 _HEEL_SHARE, _TOE_SHARE = 0.04, 0.84
 # Hair under a hat ends so far above the hat's lowest edge.
 _BRIM_M = 0.02
+# How far shoes and socks go on under the hems of trousers.
+_HEM_M = 0.03
 _CLOTH_DYES = ("navy", "charcoal", "olive", "burgundy", "teal", "beige", "grey", "sky", "green", "red")
 
 
@@ -221,6 +223,14 @@ def _linear_mean(look: Look | None) -> tuple[float, float, float] | None:
     return float(red), float(green), float(blue)
 
 
+def _under_hems(shoes: Piece, over: tuple[Piece, ...]) -> Piece:
+    """Shoes without what of them, socks mostly, is high up in trousers: tight ones would let it through."""
+    hem_z_m = min((float(piece.vertices_m[:, 2].min()) for piece in over), default=np.inf)
+    part = shoes.parts[0]
+    shown = shoes.vertices_m[part.faces][..., 2].min(axis=1) < hem_z_m + _HEM_M
+    return replace(shoes, parts=(replace(part, faces=part.faces[shown], uv=part.uv[shown]),))
+
+
 def _under_hat(hair: Piece, hat: Piece) -> Piece:
     """The hair that shows below a hat."""
     brim_z_m = float(hat.vertices_m[:, 2].min()) + _BRIM_M
@@ -279,6 +289,10 @@ def _layers(
         look = load_looks(garment, wardrobe)
         pieces[garment.kind] = _sewn(garment, wearer, look, _cloth_image(look, rng), hidden)
         hidden |= garment.binding.hides
+    if chosen.shoes is not None:
+        depth = chosen.shoes.binding.depth
+        over = tuple(pieces[garment.kind] for garment in chosen.clothes if garment.binding.depth > depth)
+        pieces["shoes"] = _under_hems(pieces["shoes"], over)
     return pieces, hidden
 
 
