@@ -280,9 +280,7 @@ def main() -> None:
         score(Subject.load(folder), arguments.frames, ledger)
     _print_tables(ledger)
     if arguments.sheet is not None:
-        rows = {
-            f"{r} ({ledger.kinds[r, kind]})\n{kind}": ledger.examples[r, kind] for r, kind in ledger.in_order()
-        }
+        rows = {f"{r} ({ledger.kinds[r, kind]})\n{kind}": ledger.examples[r, kind] for r, kind in ledger.in_order()}
         write_sheet(rows, arguments.sheet)
         print(f"\nwrote {arguments.sheet}")
 
