@@ -158,7 +158,7 @@ def _explain(error: Mapping[str, Any]) -> str:
         table = field_table()
         sections = {name.rpartition(".")[0]: "" for name in table}
         return f"unknown config key '{key}'{_nearest(key, table | sections)}"
-    rule = str(error["msg"]).replace("Input should be", "must be")
+    rule = str(error["msg"]).removeprefix("Value error, ").replace("Input should be", "must be")
     documented = ".".join(part for part in location if not part.isdigit())
     meaning = field_table().get(documented, "")
     return f"config key '{key}' {rule}, not {error['input']!r}" + (f" ({meaning})" if meaning else "")

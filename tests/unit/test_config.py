@@ -47,6 +47,7 @@ def test_benchmark_preset_has_the_reference_scale() -> None:
         ("sequence.frames=abc", "'sequence.frames' must be a valid integer"),
         ("sequence.fps=.nan", "'sequence.fps' must be a finite number"),
         ("rooms.kinds=[garage]", "'rooms.kinds.0' must be 'bathroom', 'bedroom'"),
+        ("export.splits.val=0.5", "config key 'export.splits' must have shares that sum to 1"),
         ("frames", "--set takes KEY=VALUE"),
         ("a=[", "not valid YAML"),
     ],
