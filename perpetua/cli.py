@@ -269,7 +269,7 @@ def tracks(sequence: Path, count: int, seed: int, from_pixels: str | None, out: 
 @main.command()
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--format", "export_format", metavar="NAME", required=True,
-              help="kubric (multi-view, as MVTracker reads it), tapvid3d (one file per view) or rerun (a recording).")  # fmt: skip
+              help="kubric (multi-view, as MVTracker reads it), tapvid3d (one file per view) or rerun.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write into.")
 def export(folders: tuple[Path, ...], export_format: str, out: Path) -> None:
     """Write finished sequences in the layout of another reader.

@@ -28,7 +28,5 @@ def write_scene(folder: Path) -> tuple[Scene, SequenceTracks]:
     names += [
         {"object_index": actor.object_index, "category": "person", "actor": actor.actor} for actor in scene.actors
     ]
-    write_sequence(
-        folder, scene.room, scene.actors, scene.cameras, scene.views, tracks, {"seed": 5, "objects": names}
-    )
+    write_sequence(folder, scene.room, scene.actors, scene.cameras, scene.views, tracks, {"seed": 5, "objects": names})
     return scene, tracks
