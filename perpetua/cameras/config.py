@@ -66,7 +66,7 @@ class CamerasConfig(Section):
         2, ge=0, le=32, description="views that are to see each actor at each time; of fewer than 4 views half do"
     )
     min_covered_share: float = Field(
-        0.45, ge=0.0, le=1.0, description="least share of frames in which covering_views views see an actor"
+        0.7, ge=0.0, le=1.0, description="least share of frames in which covering_views views see an actor"
     )
     min_apart_deg: float = Field(
         40.0, ge=0.0, le=180.0, description="least mean angle between the two most different views of an actor, degrees"
