@@ -72,7 +72,7 @@ class CamerasConfig(Section):
         40.0, ge=0.0, le=180.0, description="least mean angle between the two most different views of an actor, degrees"
     )
     candidates: int = Field(4, ge=1, le=64, description="sets of camera paths optimised; the best one wins")
-    steps: int = Field(400, ge=0, le=10000, description="Adam steps; 0 keeps the starts")
+    steps: int = Field(800, ge=0, le=10000, description="Adam steps; 0 keeps the starts")
     max_redraws: int = Field(5, ge=0, le=100, description="new sets of candidates tried when none passes")
     weights: CameraWeights = Field(default_factory=CameraWeights)
 
