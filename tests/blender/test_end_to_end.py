@@ -112,7 +112,12 @@ def _frames_rendered(log: Path) -> list[int]:
 def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(tmp_path: Path, workers: str) -> None:
     arguments = ("generate", "--preset", "tiny", "--rooms", "2", "--workers", workers, "--out", str(tmp_path))
     run = subprocess.Popen(
-        _command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        _command(*arguments),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=_heed_interrupts,
     )
     deadline = time.monotonic() + 120
     log = tmp_path / "log.jsonl"
@@ -127,6 +132,11 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(tmp_path: Path, workers: str
     while _group_lives(run.pid):
         assert time.monotonic() < deadline, "a process of the run is left"
         time.sleep(0.05)
+
+
+def _heed_interrupts() -> None:
+    """A job that a script starts in the background, and what it starts, ignore Ctrl-C; the run under test must not."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _group_lives(group: int) -> bool:
