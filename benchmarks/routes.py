@@ -8,6 +8,7 @@
 import argparse
 import logging
 import resource
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -97,7 +98,8 @@ def main() -> None:
 def procedural_scenes(count: int, seed: int) -> list[Scene]:
     """Procedural rooms of a seed."""
     config = RoomsConfig(source="procedural")
-    rooms = [build_room(config, BODY, StageSeed(seed, index, "room"), Path()) for index in range(count)]
+    with tempfile.TemporaryDirectory() as scratch:
+        rooms = [build_room(config, BODY, StageSeed(seed, index, "room"), Path(scratch)) for index in range(count)]
     return [
         Scene(f"procedural {index} {room.kind}", room, build_nav_grid(room, BODY), StageSeed(seed, index, "routes"))
         for index, room in enumerate(rooms)

@@ -26,6 +26,7 @@ def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         with zipfile.ZipFile(path) as archive:
             members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
             return {name: _read(archive, members[name], path) for name in names if name in members}
+    # zipfile says NotImplementedError of a compression it does not know, RuntimeError of an encrypted file.
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
         raise AssetError(f"cannot read '{path}' as an .npz file: {error}") from None
 
