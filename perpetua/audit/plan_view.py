@@ -57,6 +57,8 @@ def write_plan_view(sequence_folder: Path, picture: Path) -> None:
     _dress(plan, sequence_folder.absolute().name, record)
     if curves:
         _draw_curves([figure.add_subplot(grid[row, 1]) for row in range(len(CURVES))], curves, record)
+    # Outside the axes, where the layout makes room for it.
+    figure.legend(*plan.get_legend_handles_labels(), loc="outside lower left", ncols=2, fontsize=8, frameon=False)
     figure.savefig(picture)
 
 
@@ -122,7 +124,6 @@ def _dress(plan: Axes, name: str, record: dict[str, Any]) -> None:
     plan.set_aspect("equal")
     plan.set_xlabel("x, m")
     plan.set_ylabel("y, m")
-    plan.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=2, fontsize=8, frameon=False)
 
 
 def _draw_curves(rows: list[Axes], curves: dict[str, Any], record: dict[str, Any]) -> None:
