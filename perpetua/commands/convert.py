@@ -1,0 +1,42 @@
+"""Commands that write a finished sequence once more: with other tracks, in other layouts."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("sequence", type=click.Path(path_type=Path))
+@click.option("--count", type=click.IntRange(min=1), default=1024, show_default=True, help="Tracks to draw.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Decides which.")
+@click.option("--from-pixels", metavar="VIEW:FRAME:STEP", help="Follow every STEP-th pixel of an image instead.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write.")
+def tracks(sequence: Path, count: int, seed: int, from_pixels: str | None, out: Path) -> None:
+    """Write a finished sequence again with other tracks, any number of them, without rendering.
+
+    The run's work area must still be there.
+    """
+    from perpetua.pipeline.retrack import PixelChoice, write_other_tracks
+
+    pixels = None if from_pixels is None else PixelChoice.parse(from_pixels)
+    made = write_other_tracks(sequence, out, count, seed, pixels)
+    click.echo(f"wrote {len(made.queries_xytv)} tracks to {out}")
+
+
+@click.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--format", "export_format", metavar="NAME", required=True,
+              help="kubric (multi-view, as MVTracker reads it), tapvid3d (one file per view) or rerun.")  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write into.")
+def export(folders: tuple[Path, ...], export_format: str, out: Path) -> None:
+    """Write finished sequences in the layout of another reader.
+
+    FOLDERS are sequence folders, or folders that hold some. Only formats that tell objects apart look into the run's
+    work area, and do without where it is gone.
+    """
+    from perpetua.audit.verify import find_sequences
+    from perpetua.pipeline.convert import export_sequence
+
+    for folder in (folder for given in folders for folder in find_sequences(given)):
+        for made in export_sequence(folder, export_format, out):
+            click.echo(f"wrote {made}")

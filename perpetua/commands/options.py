@@ -1,0 +1,18 @@
+"""Options and output that several commands share."""
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+DEVICES = ("auto", "cpu", "cuda", "optix", "hip", "metal", "oneapi")
+OUT_OPTION = click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True,
+    help="Output folder.",
+)  # fmt: skip
+
+
+def wide_console() -> Console:
+    """As wide as the terminal; in a pipe or file wide enough for a table's lines to stay whole."""
+    console = Console()
+    return console if console.is_terminal else Console(width=160)
