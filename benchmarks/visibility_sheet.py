@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from perpetua.audit.drawing import BACKGROUND, FAINT, INK, Canvas, depth_colours, text_font
 from perpetua.formats.reader import Sequence, read_sequence
+from perpetua.pictures.drawing import BACKGROUND, FAINT, INK, Canvas, depth_colours, text_font
 
 REACH_PX, ENLARGE = 8, 9
 LABEL_PX, CAPTION_PX, GAP_PX = 250, 18, 8

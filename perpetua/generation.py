@@ -11,11 +11,11 @@ from pathlib import Path
 
 from rich.console import Console
 
-from perpetua.audit.contact_sheet import write_contact_sheet
 from perpetua.cluster.local import raise_on_sigterm, run_rooms
 from perpetua.config import Config
 from perpetua.errors import ConfigError, InputError, PerpetuaError
 from perpetua.files import read_json
+from perpetua.pictures.contact_sheet import write_contact_sheet
 from perpetua.pipeline.cost import Cost, check_disk, estimate_cost, gigabytes
 from perpetua.pipeline.events import OnEvent
 from perpetua.pipeline.layout import LOG_FILE, OutputLayout, open_run

@@ -51,16 +51,16 @@ def preview(
     in a folder that a later generate with the same settings goes on from.
     """
     if rooms is not None:
-        from perpetua.audit.room_gallery import GalleryRequest, write_room_gallery
+        from perpetua.pictures.room_gallery import GalleryRequest, write_room_gallery
 
         config = load_config(preset, config_path, assignments)
         folder = Path("rooms") if out is None else out
         failed = write_room_gallery(GalleryRequest(config, seed, range(rooms), folder, device), click.echo)
         click.echo(f"wrote {folder / 'index.html'}")
         sys.exit(1 if failed else 0)
-    from perpetua.audit.actor_sheets import write_actor_sheet
-    from perpetua.audit.contact_sheet import write_contact_sheet
-    from perpetua.audit.plan_view import write_plan_view
+    from perpetua.pictures.actor_sheets import write_actor_sheet
+    from perpetua.pictures.contact_sheet import write_contact_sheet
+    from perpetua.pictures.plan_view import write_plan_view
 
     if actors is None and sequence is None:
         raise InputError("preview needs the folder of a sequence, or --actors N, or --rooms N")

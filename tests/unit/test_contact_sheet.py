@@ -10,10 +10,10 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 from synthetic_sequence import write_scene
 
-from perpetua.audit.contact_sheet import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX, write_contact_sheet
-from perpetua.audit.drawing import Canvas, depth_colours
-from perpetua.audit.plan_view import CURVES, write_plan_view
 from perpetua.errors import SequenceFormatError
+from perpetua.pictures.contact_sheet import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX, write_contact_sheet
+from perpetua.pictures.drawing import Canvas, depth_colours
+from perpetua.pictures.plan_view import CURVES, write_plan_view
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from scene_samples import procedural_room
 
-from perpetua.audit.room_gallery import GalleryRequest, RoomCard, _write_page, describe_room
-from perpetua.audit.room_views import CLEARANCE_M, CUT_SHARE, TOP, RoomViews, place_views
 from perpetua.cameras.types import CameraPath
 from perpetua.config import load_config
 from perpetua.geometry.mesh import join
@@ -15,6 +13,8 @@ from perpetua.geometry.pinhole import inside_image, project
 from perpetua.geometry.raycast import Caster
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
+from perpetua.pictures.room_gallery import GalleryRequest, RoomCard, _write_page, describe_room
+from perpetua.pictures.room_views import CLEARANCE_M, CUT_SHARE, TOP, RoomViews, place_views
 from perpetua.rooms.types import Room
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float64, Int64, UInt8
 from PIL import Image, ImageDraw
 
-from perpetua.audit.drawing import BACKGROUND, FAINT, INK, Canvas, depth_colours, text_font, track_colour
 from perpetua.audit.geometry import moves_more_than, project_to_pixels
 from perpetua.formats.reader import Sequence, SequenceView, read_sequence
+from perpetua.pictures.drawing import BACKGROUND, FAINT, INK, Canvas, depth_colours, text_font, track_colour
 
 CELL_WIDTH_PX = 320
 GAP_PX = 6

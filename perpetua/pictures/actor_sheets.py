@@ -15,12 +15,12 @@ from perpetua.actors.bodies.source import Body
 from perpetua.actors.config import ActorsConfig
 from perpetua.actors.motion.plan import make_motions
 from perpetua.actors.types import BODY_JOINTS, ActorMesh, ActorPart, BodyMotion, Route
-from perpetua.audit.drawing import BACKGROUND, INK, text_font
 from perpetua.cameras.types import CameraPath
 from perpetua.config import Config
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.transforms import look_at
+from perpetua.pictures.drawing import BACKGROUND, INK, text_font
 from perpetua.rendering.render import render_views
 from perpetua.rooms.types import AreaLight, Material, Room, SceneObject
 from perpetua.seeding import StageSeed

@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image
 
-from perpetua.audit.room_views import HEIGHT_PX, TOP, WIDTH_PX, place_views
 from perpetua.config import Config
 from perpetua.errors import PerpetuaError
 from perpetua.files import read_json, write_json
 from perpetua.navigation.types import NavGrid
+from perpetua.pictures.room_views import HEIGHT_PX, TOP, WIDTH_PX, place_views
 from perpetua.pipeline import codec
 from perpetua.pipeline.layout import OutputLayout, open_run, sequence_name
 from perpetua.pipeline.runner import RoomRun
