@@ -255,7 +255,6 @@ def test_equal_sequences_give_equal_bytes(name: str, made: tuple[Path, Scene, Se
 
 
 def test_rerun_recording_is_read_back(made: tuple[Path, Scene, SequenceTracks], tmp_path: Path) -> None:
-    pytest.importorskip("rerun")
     import rerun.dataframe
 
     folder, scene, tracks = made
