@@ -8,11 +8,14 @@ An event is one line of JSON on the stdout that the parent gave us. Everything e
 import ctypes
 import json
 import os
+import select
 import signal
 import sys
 from pathlib import Path
 
 PR_SET_PDEATHSIG = 1
+# Set where stdin is a pipe that breaks when the parent ends.
+PARENT_PIPE_VARIABLE = "PERPETUA_PARENT_PIPE"
 
 
 class Worker:
@@ -21,6 +24,8 @@ class Worker:
     def __init__(self) -> None:
         self._parent = os.getppid()
         self._die_with_parent()
+        # A parent that was killed while Blender was being loaded has someone else at work here by now.
+        self.check_parent()
         self._events = os.fdopen(os.dup(1), "w", buffering=1, encoding="utf-8")
         os.dup2(2, 1)
 
@@ -38,13 +43,21 @@ class Worker:
 
     def check_parent(self) -> None:
         """Ends this process if the parent is gone (where the kernel does not do so)."""
-        if os.getppid() != self._parent:
+        if os.getppid() != self._parent or _parent_pipe_is_broken():
             os._exit(1)
 
     def _die_with_parent(self) -> None:
         if not sys.platform.startswith("linux"):
             return
         ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def _parent_pipe_is_broken() -> bool:
+    if PARENT_PIPE_VARIABLE not in os.environ:
+        return False
+    watch = select.poll()
+    watch.register(0, 0)
+    return any(events & (select.POLLHUP | select.POLLERR) for _, events in watch.poll(0))
 
 
 def read_job(path: Path) -> dict:

@@ -16,6 +16,8 @@ from perpetua.errors import AssetError, EnvironmentSetupError, StageError
 from perpetua.system_libraries import SYSTEM_LIBRARIES
 
 SCRIPT_FOLDER = Path(__file__).parent.parent / "blender_scripts"
+# Tells a script that its stdin is a pipe which breaks when this process ends, even before the script looks for it.
+PARENT_PIPE_VARIABLE = "PERPETUA_PARENT_PIPE"
 TAIL_LINES = 12
 READ_BYTES = 65536
 
@@ -60,7 +62,7 @@ def run_script(
     with log_path.open("wb") as log:
         process = subprocess.Popen(
             _command(script, job_path, blender),
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=log,
             env=_environment(scratch),
@@ -93,7 +95,8 @@ def _environment(scratch: Path) -> dict[str, str]:
     """Ours, with a settings folder of Blender's own: none of the user's add-ons, nothing written to their home."""
     resources = scratch.resolve() / "blender_user"
     resources.mkdir(exist_ok=True)
-    return os.environ | {"BLENDER_USER_RESOURCES": str(resources), "PYTHONHASHSEED": "0"}
+    private = {"BLENDER_USER_RESOURCES": str(resources), "PYTHONHASHSEED": "0", PARENT_PIPE_VARIABLE: "1"}
+    return os.environ | private
 
 
 def _read_events(stdout: IO[bytes], silence_timeout_s: float, on_event: Callable[[Event], None]) -> bool:
@@ -130,8 +133,9 @@ def _kill_group(process: subprocess.Popen[bytes]) -> None:
     except (ProcessLookupError, PermissionError):
         process.kill()
     process.wait()
-    if process.stdout is not None:
-        process.stdout.close()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            pipe.close()
 
 
 def _tail(log_path: Path) -> str:

@@ -1,5 +1,7 @@
 """Running a script of Blender: events, last words, time-outs, and that no process is left behind."""
 
+import signal
+import subprocess
 import sys
 import textwrap
 import time
@@ -7,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from perpetua.blender import BlenderError, Event, run_script
+from perpetua.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.errors import AssetError, EnvironmentSetupError
 
 
@@ -108,6 +110,51 @@ def test_interrupt_ends_the_process(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         run_script(script, tmp_path / "job", blender=None, scratch=tmp_path, silence_timeout_s=20.0, on_event=interrupt)
     _wait_until_gone(pids[0])
+
+
+def test_parent_that_is_killed_while_blender_is_loaded_leaves_no_worker(tmp_path: Path) -> None:
+    script = tmp_path / "slow_to_load.py"
+    script.write_text(
+        f"""
+import sys, time
+from pathlib import Path
+sys.path.insert(0, {str(SCRIPT_FOLDER)!r})
+from worker_link import Worker
+here = Path(__file__).parent
+(here / "loading").touch()
+while not (here / "loaded").exists():
+    time.sleep(0.02)
+worker = Worker()
+(here / "working").touch()
+worker.emit("done")
+"""
+    )
+    call = f"""
+from pathlib import Path
+from perpetua.blender import run_script
+script = Path({str(script)!r})
+run_script(script, script, blender=None, scratch=script.parent, silence_timeout_s=60.0, on_event=print)
+"""
+    for killed in (True, False):
+        for mark in ("loading", "loaded", "working"):
+            (tmp_path / mark).unlink(missing_ok=True)
+        parent = subprocess.Popen([sys.executable, "-c", call], stdout=subprocess.DEVNULL)
+        _wait_for(tmp_path / "loading")
+        child = int(Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text())
+        if killed:
+            parent.kill()
+            parent.wait()
+        (tmp_path / "loaded").touch()
+        _wait_until_gone(child)
+        assert parent.wait(timeout=20) == (-signal.SIGKILL if killed else 0)
+        assert (tmp_path / "working").exists() is not killed
+
+
+def _wait_for(path: Path) -> None:
+    deadline = time.monotonic() + 20.0
+    while not path.exists():
+        assert time.monotonic() < deadline, f"{path} does not come"
+        time.sleep(0.02)
 
 
 def test_a_blender_program_gets_the_job_after_two_dashes(tmp_path: Path) -> None:
