@@ -15,12 +15,9 @@ from perpetua.formats import layout
 from perpetua.geometry.transforms import invert_rigid
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.types import Room
-from perpetua.tracks.motion import MOVING_M, travel_m
+from perpetua.tracks.motion import MOVING_M, is_fast, travel_m
 from perpetua.tracks.surface import SceneMeshes, SurfacePoints, bind
 from perpetua.tracks.types import PointTracks, SequenceTracks
-
-FAST_M = 2.0
-FAST_FRAMES = 24
 
 
 def write_sequence(
@@ -108,11 +105,7 @@ def _write_record(folder: Path, points: PointTracks, record: dict[str, Any]) -> 
 def _classes(position_m: Float64[np.ndarray, "T N 3"]) -> list[str]:
     """ "static" never moves; "dynamic" moves more than 5 cm, "fast" more than 2 m within 24 frames; else "slow"."""
     reach_m = travel_m(position_m)
-    fastest_m = np.zeros(position_m.shape[1])
-    far = np.flatnonzero(2.0 * reach_m > FAST_M)
-    far_m = position_m[:, far]
-    for gap in range(1, min(FAST_FRAMES, len(position_m) - 1) + 1):
-        apart_m = np.linalg.norm(far_m[gap:] - far_m[:-gap], axis=2).max(axis=0)
-        fastest_m[far] = np.maximum(fastest_m[far], apart_m)
-    names = np.select([fastest_m > FAST_M, reach_m > MOVING_M, reach_m > 0.0], ["fast", "dynamic", "slow"], "static")
+    names = np.select(
+        [is_fast(position_m, reach_m), reach_m > MOVING_M, reach_m > 0.0], ["fast", "dynamic", "slow"], "static"
+    )
     return [str(name) for name in names]

@@ -1,8 +1,8 @@
 """Rays and closest distances against triangles: Embree for rays, Warp for distances and for rays at moving meshes.
 
 Both work in single precision (about 1e-6 of the scene's size); the distance of a ray's hit is computed again in
-double precision from the triangle that was hit. Embree's hierarchy is the quicker one to ask and slow to build;
-Warp's is refitted to moved vertices in milliseconds.
+double precision from the triangle that was hit (``meet`` leaves that to its caller). Embree's hierarchy is the
+quicker one to ask and slow to build; Warp's is refitted to moved vertices in milliseconds.
 """
 
 import importlib
@@ -11,13 +11,11 @@ from functools import cache, cached_property
 from typing import Any, no_type_check
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64
+from jaxtyping import Bool, Float, Float32, Float64, Int32
 
 from perpetua.geometry.mesh import TriMesh
 
 NO_FACE = -1
-# A box is widened by this, so that single precision loses no ray along its sides.
-BOX_MARGIN_M = 1e-4
 FAR_M = 1e6
 
 
@@ -37,6 +35,15 @@ class RayHits:
     def hit(self) -> Bool[np.ndarray, " N"]:
         """Which rays meet a triangle."""
         return np.asarray(self.face != NO_FACE)
+
+
+@dataclass(frozen=True)
+class RoughHits:
+    """The first triangle on each ray, in single precision: length along the ray (infinite where nothing is hit) and
+    the triangle's index (-1: nothing)."""
+
+    distance_m: Float32[np.ndarray, " N"]
+    face: Int32[np.ndarray, " N"]
 
 
 class Caster:
@@ -62,6 +69,14 @@ class Caster:
         corners_m = self.mesh.vertices_m[self.mesh.faces[face[hit]]]
         distance_m[hit] = _plane_distance_m(origins_m[hit], unit[hit], corners_m, found["tfar"][hit].astype(np.float64))
         return RayHits(distance_m, face, barycentric)
+
+    def meet(self, eye_m: Float64[np.ndarray, "3"], unit: Float32[np.ndarray, "N 3"]) -> RoughHits:
+        """The first triangle, front or back side, on each ray from a place in a direction of unit length."""
+        if len(unit) == 0 or len(self.mesh.faces) == 0:
+            return RoughHits(np.full(len(unit), np.inf, np.float32), np.full(len(unit), NO_FACE, np.int32))
+        found = self._embree.run(np.repeat(_single(eye_m)[None], len(unit), axis=0), _single(unit), output=1)
+        face = np.maximum(found["primID"], NO_FACE).astype(np.int32)
+        return RoughHits(np.where(face == NO_FACE, np.float32(np.inf), found["tfar"]), face)
 
     def clear(
         self, origins_m: Float64[np.ndarray, "N 3"], targets_m: Float64[np.ndarray, "N 3"]
@@ -109,60 +124,36 @@ class Caster:
 
     @cached_property
     def _warp_mesh(self) -> Any:
-        return _make_warp_mesh(self.mesh)
+        return _make_warp_mesh(self.mesh.vertices_m, self.mesh.faces)
 
 
 class MovingCaster:
-    """First hits on one mesh whose vertices move; ``move_to`` comes before every change of place."""
+    """First hits, from one place, on one mesh whose vertices move; ``move_to`` comes before every change of place."""
 
-    def __init__(self, mesh: TriMesh) -> None:
-        self.mesh = mesh
-        self._warp_mesh = _make_warp_mesh(mesh)
+    def __init__(self, vertices_m: Float32[np.ndarray, "P 3"], faces: Int32[np.ndarray, "F 3"]) -> None:
+        self.vertices_m, self.faces = vertices_m, faces
+        self._warp_mesh = _make_warp_mesh(vertices_m, faces) if len(faces) else None
 
-    def move_to(self, vertices_m: Float64[np.ndarray, "P 3"]) -> None:
+    def move_to(self, vertices_m: Float32[np.ndarray, "P 3"]) -> None:
         """Puts the mesh's vertices elsewhere."""
-        self.mesh = TriMesh(vertices_m, self.mesh.faces)
-        self._warp_mesh.points.assign(_single(vertices_m))
-        self._warp_mesh.refit()
+        self.vertices_m = vertices_m
+        if self._warp_mesh is not None:
+            self._warp_mesh.points.assign(_single(vertices_m))
+            self._warp_mesh.refit()
 
-    def first_hit(self, origins_m: Float64[np.ndarray, "N 3"], directions: Float64[np.ndarray, "N 3"]) -> RayHits:
-        """The first triangle, front or back side, that each ray meets; directions need not have unit length."""
-        unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-        distance_m, face = np.full(len(unit), np.inf), np.full(len(unit), NO_FACE, np.int32)
-        near = self._may_meet(origins_m, unit)
-        found = self._cast(origins_m[near], unit[near])
-        hit = found.face != NO_FACE
-        corners_m = self.mesh.vertices_m[self.mesh.faces[found.face[hit]]]
-        barycentric = np.zeros((len(unit), 3))
-        face[near], barycentric[near] = found.face, found.barycentric
-        distance_m[near[hit]] = _plane_distance_m(
-            origins_m[near[hit]], unit[near[hit]], corners_m, found.distance_m[hit]
-        )
-        return RayHits(distance_m, face, barycentric)
+    def corner_m(self, face: Int32[np.ndarray, " M"]) -> Float64[np.ndarray, "M 3 3"]:
+        """Where the corners of triangles are."""
+        return self.vertices_m[self.faces[face]].astype(np.float64)
 
-    def _may_meet(
-        self, origins_m: Float64[np.ndarray, "N 3"], unit: Float64[np.ndarray, "N 3"]
-    ) -> Int64[np.ndarray, " M"]:
-        """Rays that meet the mesh's box (the slab test of Kay and Kajiya 1986)."""
-        low_m, high_m = self.mesh.vertices_m.min(axis=0) - BOX_MARGIN_M, self.mesh.vertices_m.max(axis=0) + BOX_MARGIN_M
-        with np.errstate(divide="ignore", invalid="ignore"):
-            first, second = (low_m - origins_m) / unit, (high_m - origins_m) / unit
-        enter_m = np.nan_to_num(np.minimum(first, second), nan=-np.inf).max(axis=1)
-        leave_m = np.nan_to_num(np.maximum(first, second), nan=np.inf).min(axis=1)
-        return np.flatnonzero((leave_m >= enter_m) & (leave_m >= 0.0))
-
-    def _cast(self, origins_m: Float64[np.ndarray, "N 3"], unit: Float64[np.ndarray, "N 3"]) -> RayHits:
-        if len(unit) == 0:
-            return RayHits(np.zeros(0), np.zeros(0, np.int32), np.zeros((0, 3)))
-        warp, kernel = _first_hit_kernel()
-        origins, directions = (warp.array(_single(given), dtype=warp.vec3, device="cpu") for given in (origins_m, unit))
-        face = warp.full(len(unit), NO_FACE, dtype=int, device="cpu")
-        place = warp.zeros(len(unit), dtype=warp.vec3, device="cpu")
-        warp.launch(kernel, len(unit), [self._warp_mesh.id, origins, directions, face, place], device="cpu")
-        reach = place.numpy().astype(np.float64)
-        weights = np.stack([reach[:, 1], reach[:, 2], 1.0 - reach[:, 1] - reach[:, 2]], axis=1)
-        hit = face.numpy() != NO_FACE
-        return RayHits(np.where(hit, reach[:, 0], np.inf), face.numpy().astype(np.int32), weights * hit[:, None])
+    def meet(self, eye_m: Float64[np.ndarray, "3"], unit: Float32[np.ndarray, "N 3"]) -> RoughHits:
+        """The first triangle, front or back side, on each ray from a place in a direction of unit length."""
+        face, distance_m = np.full(len(unit), NO_FACE, np.int32), np.full(len(unit), np.inf, np.float32)
+        if len(unit) and self._warp_mesh is not None:
+            warp, kernel = _first_hit_kernel()
+            kinds = ((_single(unit), warp.vec3), (face, int), (distance_m, float))
+            shared = [warp.array(values, dtype=kind, device="cpu", copy=False) for values, kind in kinds]
+            warp.launch(kernel, len(unit), [self._warp_mesh.id, warp.vec3(*eye_m.tolist()), *shared], device="cpu")
+        return RoughHits(distance_m, face)
 
 
 def _plane_distance_m(
@@ -183,10 +174,10 @@ def _single(values: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
-def _make_warp_mesh(mesh: TriMesh) -> Any:
+def _make_warp_mesh(vertices_m: Float[np.ndarray, "P 3"], faces: Int32[np.ndarray, "F 3"]) -> Any:
     warp = _warp()
-    points = warp.array(_single(mesh.vertices_m), dtype=warp.vec3, device="cpu")
-    indices = warp.array(np.ascontiguousarray(mesh.faces.ravel()), dtype=int, device="cpu")
+    points = warp.array(_single(vertices_m), dtype=warp.vec3, device="cpu")
+    indices = warp.array(np.ascontiguousarray(faces.ravel()), dtype=int, device="cpu")
     return warp.Mesh(points=points, indices=indices, bvh_constructor="median")
 
 
@@ -218,21 +209,21 @@ def _nearest_kernel() -> tuple[Any, Any]:
 
 @cache
 def _first_hit_kernel() -> tuple[Any, Any]:
-    """``place`` gets the distance and the weights of the triangle's first two corners."""
+    """Leaves ``face`` and ``distance_m`` as they are where nothing is met."""
     warp = _warp()
 
     @no_type_check
     def first_hit(
         mesh: warp.uint64,
-        origins: warp.array(dtype=warp.vec3),
+        eye: warp.vec3,
         directions: warp.array(dtype=warp.vec3),
         face: warp.array(dtype=int),
-        place: warp.array(dtype=warp.vec3),
+        distance_m: warp.array(dtype=float),
     ):
         i = warp.tid()
-        query = warp.mesh_query_ray(mesh, origins[i], directions[i], 1.0e6)
+        query = warp.mesh_query_ray(mesh, eye, directions[i], 1.0e6)
         if query.result:
             face[i] = query.face
-            place[i] = warp.vec3(query.t, query.u, query.v)
+            distance_m[i] = query.t
 
     return warp, warp.kernel(first_hit)

@@ -14,6 +14,12 @@ class TracksConfig(Section):
 
     count: int = Field(1024, ge=1, le=10_000_000, description="tracks of a sequence")
     dynamic_share: float = Field(0.3, ge=0.0, le=1.0, description="share of tracks that move more than 5 cm")
+    fast_share: float = Field(
+        0.1,
+        ge=0.0,
+        le=1.0,
+        description="least share of tracks that move more than 2 m within 24 frames, as far as actors are that fast",
+    )
     min_visible: int = Field(2, ge=1, description="least number of (view, frame) pairs a track is visible in")
     tolerance_m: float = Field(0.003, gt=0.0, le=0.1, description="rendered depth in front, constant part, metres")
     tolerance_share: float = Field(0.002, ge=0.0, le=0.1, description="rendered depth in front, share of the depth")

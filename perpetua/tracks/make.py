@@ -1,15 +1,16 @@
 """The track stage: draws points, follows them, finds where they are seen, keeps the best spread ones."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int64
+from jaxtyping import Bool
 
 from perpetua.errors import TrackError
 from perpetua.seeding import StageSeed
 from perpetua.tracks.candidates import ActorSurfaces, StaticSurfaces
 from perpetua.tracks.follow import TrackScene
-from perpetua.tracks.motion import MOVING_M, travel_m
+from perpetua.tracks.motion import MOVING_M, is_fast, travel_m
 from perpetua.tracks.selection import seen_cells, spread
 from perpetua.tracks.surface import SurfacePoints, join_points
 from perpetua.tracks.types import SequenceTracks
@@ -17,14 +18,17 @@ from perpetua.tracks.types import SequenceTracks
 # Usable points per track wanted, before drawing stops.
 SPARE = 1.5
 SCANNED_FRAMES = 32
+# Points whose positions at all frames are in memory at a time.
+MOTION_BLOCK = 16_384
 
 
 def make_tracks(scene: TrackScene, seed: StageSeed) -> SequenceTracks:
     """Tracks of a sequence: rigid points that never move, and points on actors that move more than 5 cm.
 
     Exactly ``round(dynamic_share * count)`` tracks move; how far is the largest distance between two of a track's
-    positions. Every track is visible in at least ``min_visible`` (view, frame) pairs. The order of the tracks is
-    random, so that any first part of them is a fair sample.
+    positions. At least ``round(fast_share * count)`` of them are fast, or as many as were found. Every track is
+    visible in at least ``min_visible`` (view, frame) pairs. The order of the tracks is random, so that any first part
+    of them is a fair sample.
 
     Args:
         scene: what is followed, with the settings.
@@ -66,15 +70,12 @@ class _Collector:
         if wanted == 0:
             return join_points([])
         enough = int(np.ceil(SPARE * wanted))
-        groups: list[SurfacePoints] = []
-        seen: list[Bool[np.ndarray, "C S N"]] = []
+        groups: list[_Candidates] = []
         drawn = found = 0
         for attempt in range(self.config.max_draws):
             points = draw(int(np.ceil(self.config.candidates * wanted)), self.seed.stream(name, attempt))
-            usable, visible = self._usable(points, moving)
-            groups.append(points.take(usable))
-            seen.append(visible[:, :, usable])
-            drawn, found = drawn + len(points), found + len(usable)
+            groups.append(self._usable(points, moving))
+            drawn, found = drawn + len(points), found + len(groups[-1].points)
             if found >= enough:
                 break
         if found < wanted:
@@ -83,18 +84,47 @@ class _Collector:
                 f"{self.config.min_visible} images{f' and move more than {MOVING_M} m' if moving else ''}: lower "
                 "tracks.count, tracks.dynamic_share or tracks.min_visible, or raise tracks.max_draws"
             )
-        return self._spread(name, wanted, join_points(groups), np.concatenate(seen, axis=2))
+        return self._spread(name, wanted, _Candidates.join(groups))
 
-    def _usable(self, points: SurfacePoints, moving: bool) -> tuple[Int64[np.ndarray, " M"], Bool[np.ndarray, "C S N"]]:
-        bound = self.scene.bind(points)
-        visible = self.scene.look(bound, self.scanned).visible
+    def _usable(self, points: SurfacePoints, moving: bool) -> "_Candidates":
+        visible = self.scene.look(self.scene.bind(points), self.scanned).visible
         usable = visible.sum(axis=(0, 1)) >= self.config.min_visible
+        fast = np.zeros(len(points), bool)
         if moving:
-            usable &= travel_m(bound.position_m(self.scene.frames)) > MOVING_M
-        return np.flatnonzero(usable), visible
+            moves, fast = self._motion(points)
+            usable &= moves
+        return _Candidates(points.take(usable), visible[:, :, usable], fast[usable])
 
-    def _spread(
-        self, name: str, wanted: int, points: SurfacePoints, visible: Bool[np.ndarray, "C S N"]
-    ) -> SurfacePoints:
-        cells = seen_cells(self.scene.bind(points), self.scene.cameras, self.scanned, visible)
-        return points.take(spread(wanted, points.object_index, cells, self.seed.stream(name, "spread")))
+    def _motion(self, points: SurfacePoints) -> tuple[Bool[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
+        """Which points move, and which are fast."""
+        moves, fast = np.zeros(len(points), bool), np.zeros(len(points), bool)
+        for start in range(0, len(points), MOTION_BLOCK):
+            block = slice(start, start + MOTION_BLOCK)
+            position_m = self.scene.bind(points.take(np.arange(len(points))[block])).position_m(self.scene.frames)
+            reach_m = travel_m(position_m)
+            moves[block], fast[block] = reach_m > MOVING_M, is_fast(position_m, reach_m)
+        return moves, fast
+
+    def _spread(self, name: str, wanted: int, found: "_Candidates") -> SurfacePoints:
+        points = found.points
+        cells = seen_cells(self.scene.bind(points), self.scene.cameras, self.scanned, found.visible)
+        least = round(self.config.fast_share * self.config.count)
+        rng = self.seed.stream(name, "spread")
+        return points.take(spread(wanted, points.object_index, cells, rng, found.fast, least))
+
+
+@dataclass(frozen=True)
+class _Candidates:
+    """Points that may become tracks, where they were seen at the frames looked at, and which are fast."""
+
+    points: SurfacePoints
+    visible: Bool[np.ndarray, "C S N"]
+    fast: Bool[np.ndarray, " N"]
+
+    @classmethod
+    def join(cls, groups: list["_Candidates"]) -> "_Candidates":
+        return cls(
+            join_points([group.points for group in groups]),
+            np.concatenate([group.visible for group in groups], axis=2),
+            np.concatenate([group.fast for group in groups]),
+        )

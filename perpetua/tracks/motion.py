@@ -1,9 +1,11 @@
 """How far points move."""
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 
 MOVING_M = 0.05
+# What moves farther than this within so many frames is fast.
+FAST_M, FAST_FRAMES = 2.0, 24
 
 
 def travel_m(position_m: Float64[np.ndarray, "T N 3"], block: int = 256) -> Float64[np.ndarray, " N"]:
@@ -21,3 +23,16 @@ def travel_m(position_m: Float64[np.ndarray, "T N 3"], block: int = 256) -> Floa
             apart_m = np.linalg.norm(track_m[frame:] - track_m[frame - 1], axis=2).max(axis=0)
             reach_m[chosen] = np.maximum(reach_m[chosen], apart_m)
     return np.asarray(reach_m)
+
+
+def is_fast(position_m: Float64[np.ndarray, "T N 3"], reach_m: Float64[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
+    """Whether points move more than ``FAST_M`` between two frames at most ``FAST_FRAMES`` apart.
+
+    ``reach_m``, what ``travel_m`` gives, rules most of them out.
+    """
+    fast = np.zeros(position_m.shape[1], bool)
+    far = np.flatnonzero(2.0 * reach_m > FAST_M)
+    far_m = position_m[:, far]
+    for gap in range(1, min(FAST_FRAMES, len(position_m) - 1) + 1):
+        fast[far] |= np.linalg.norm(far_m[gap:] - far_m[:-gap], axis=2).max(axis=0) > FAST_M
+    return fast

@@ -39,14 +39,14 @@ def _points(scene: TrackScene, view: int, frame: int, step: int) -> SurfacePoint
     row, column = np.mgrid[: camera.intrinsics.height_px : step, : camera.intrinsics.width_px : step].reshape(2, -1)
     pixel_px = np.stack([column, row], axis=1).astype(np.float64)
     world_from_camera = camera.world_from_camera[frame]
-    eye_m = np.repeat(world_from_camera[None, :3, 3], len(pixel_px), axis=0)
+    eye_m = world_from_camera[:3, 3].copy()
     direction = transform_points(world_from_camera, unproject(camera.intrinsics, pixel_px, np.ones(len(pixel_px))))
     direction = direction - eye_m
     hits = scene.sight.first_hit(frame, eye_m, direction)
     met = hits.object_index != NOTHING
     points = SurfacePoints(hits.object_index[met], hits.face[met], np.zeros((int(met.sum()), 3)))
     unit = direction[met] / np.linalg.norm(direction[met], axis=1, keepdims=True)
-    place_m = eye_m[met] + hits.distance_m[met, None] * unit
+    place_m = eye_m + hits.distance_m[met, None] * unit
     weight = plane_barycentric(place_m, scene.bind(points).corner_m(frame))
     sound = np.isfinite(weight).all(axis=1)
     weight = np.clip(weight[sound], 0.0, None)

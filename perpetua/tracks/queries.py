@@ -6,8 +6,9 @@ from jaxtyping import Bool, Float32, Float64
 from perpetua.cameras.types import CameraPath
 from perpetua.geometry.pinhole import project
 from perpetua.geometry.transforms import invert_rigid, transform_points
+from perpetua.tracks.placed import as_exported
 from perpetua.tracks.types import ViewTracks
-from perpetua.tracks.visibility import as_exported, exported_intrinsics
+from perpetua.tracks.visibility import exported_intrinsics
 
 QUERY_SEED = 42
 

@@ -22,6 +22,8 @@ def spread(
     object_index: Int32[np.ndarray, " N"],
     cells: csr_matrix,
     rng: np.random.Generator,
+    reserved: Bool[np.ndarray, " N"] | None = None,
+    least: int = 0,
 ) -> Int64[np.ndarray, " M"]:
     """Chooses ``wanted`` candidates greedily, a batch at a time, best first.
 
@@ -33,6 +35,7 @@ def spread(
         object_index: object of each candidate.
         cells: candidates x (view, time, image cell), 1 where the candidate is seen; see ``seen_cells``.
         rng: breaks ties.
+        reserved: candidates of which at least ``least`` are chosen, or all if they are fewer.
     """
     _, thing, candidates_of = np.unique(object_index, return_inverse=True, return_counts=True)
     thing, appetite = thing.reshape(-1), np.sqrt(candidates_of.astype(np.float64))
@@ -41,17 +44,25 @@ def spread(
     chosen: list[Int64[np.ndarray, " B"]] = []
     taken = np.zeros(len(object_index), bool)
     appetite *= OBJECT_WEIGHT / appetite.max(initial=1.0)
-    for batch in np.array_split(np.arange(wanted), min(ROUNDS, max(wanted, 1))):
+    closed = np.zeros(len(taken), bool) if reserved is None else ~reserved
+    least = min(least, wanted, int((~closed).sum()))
+    for size, only_reserved in [*_batches(least, wanted, True), *_batches(wanted - least, wanted, False)]:
         gain = cells @ (1.0 / (1.0 + in_cell)) / seen_in
         gain += (appetite / (1.0 + on_object))[thing]
         gain *= 1.0 + JITTER * rng.random(len(gain))
-        gain[taken] = -1.0
-        best = np.argsort(-gain, kind="stable")[: len(batch)]
+        gain[taken | (closed & only_reserved)] = -1.0
+        best = np.argsort(-gain, kind="stable")[:size]
         chosen.append(best)
         taken[best] = True
         in_cell += np.asarray(cells[best].sum(axis=0)).reshape(-1)
         on_object += np.bincount(thing[best], minlength=len(on_object))
-    return np.concatenate(chosen)
+    return np.concatenate([np.zeros(0, np.int64), *chosen])
+
+
+def _batches(count: int, wanted: int, only_reserved: bool) -> list[tuple[int, bool]]:
+    """Sizes of batches of about a ``ROUNDS``-th of what is wanted in all."""
+    rounds = min(count, -(-ROUNDS * count // max(wanted, 1)))
+    return [(len(batch), only_reserved) for batch in np.array_split(np.arange(count), rounds)] if rounds else []
 
 
 def seen_cells(

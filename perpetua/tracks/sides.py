@@ -20,6 +20,15 @@ class ClosedSides:
     closed: Bool[np.ndarray, " N"]
     box_m: Float64[np.ndarray, "N 2 3"]
 
+    def take(self, chosen: Int64[np.ndarray, " M"] | Bool[np.ndarray, " N"]) -> "ClosedSides":
+        """Some of them."""
+        return ClosedSides(self.closed[chosen], self.box_m[chosen])
+
+    def hide_back(self, eye_m: Float64[np.ndarray, "3"]) -> Bool[np.ndarray, " N"]:
+        """Whether the back is hidden from a camera: it is unless that is inside, as a closed room is seen."""
+        inside = ((eye_m >= self.box_m[:, 0]) & (eye_m <= self.box_m[:, 1])).all(axis=1)
+        return np.asarray(self.closed & ~inside)
+
 
 class SideTable:
     """The closed surfaces of a scene, found once per object and only for objects that are asked for."""

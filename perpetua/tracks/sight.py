@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32
+from jaxtyping import Bool, Float32, Float64, Int32
 
 from perpetua.actors.types import ActorMesh
-from perpetua.geometry.mesh import TriMesh, join
+from perpetua.geometry.mesh import join
+from perpetua.geometry.planes import Planes
 from perpetua.geometry.raycast import NO_FACE, Caster, MovingCaster
 from perpetua.tracks.surface import SceneMeshes
 
@@ -27,46 +28,64 @@ class SceneSight:
 
     def __init__(self, meshes: SceneMeshes) -> None:
         self.meshes = meshes
-        self._index = np.array(sorted(meshes.static), np.int32)
-        parts = [meshes.static[index] for index in self._index.tolist()]
-        self._room = Caster(join(parts))
-        self._first_face = np.cumsum([0] + [len(part.faces) for part in parts])
-        self._actors = {
-            index: MovingCaster(TriMesh(_at(vertices_m, 0), meshes.moving_faces[index]))
-            for index, vertices_m in meshes.moving_vertices_m.items()
-        }
+        room = join(list(meshes.static.values()))
+        self._room, self._room_planes = Caster(room), Planes.of(room.vertices_m[room.faces])
+        self._room_face = _FaceTable.of({index: len(mesh.faces) for index, mesh in meshes.static.items()})
+        self._actors = MovingCaster(self._actor_vertices_m(0), _joined_actor_faces(meshes))
+        self._actor_face = _FaceTable.of({index: len(faces) for index, faces in meshes.moving_faces.items()})
         self._frame = 0
 
     def first_hit(
-        self, frame: int, origins_m: Float64[np.ndarray, "N 3"], directions: Float64[np.ndarray, "N 3"]
+        self, frame: int, eye_m: Float64[np.ndarray, "3"], directions: Float64[np.ndarray, "N 3"]
     ) -> SightHits:
-        """What each ray meets first at a frame; directions need not have unit length."""
+        """What each ray from one place meets first at a frame; directions need not have unit length.
+
+        Which triangle is met is found in single precision; how far it is, in double.
+        """
         self._go_to(frame)
-        found = self._room.first_hit(origins_m, directions)
-        place = np.searchsorted(self._first_face, found.face, side="right") - 1
-        hit = found.face != NO_FACE
-        object_index = np.full(len(origins_m), NOTHING, np.int32)
-        face = np.full(len(origins_m), NO_FACE, np.int32)
-        object_index[hit] = self._index[place[hit]]
-        face[hit] = found.face[hit] - self._first_face[place[hit]]
-        distance_m = found.distance_m
-        for index, caster in self._actors.items():
-            on_actor = caster.first_hit(origins_m, directions)
-            nearer = on_actor.distance_m < distance_m
-            object_index[nearer], face[nearer] = index, on_actor.face[nearer]
-            distance_m = np.where(nearer, on_actor.distance_m, distance_m)
+        unit = directions / np.sqrt(np.einsum("nc,nc->n", directions, directions))[:, None]
+        single = unit.astype(np.float32)
+        room, actors = self._room.meet(eye_m, single), self._actors.meet(eye_m, single)
+        before = actors.distance_m < room.distance_m
+        object_index = np.where(before, self._actor_face.owner[actors.face], self._room_face.owner[room.face])
+        face = np.where(before, self._actor_face.face[actors.face], self._room_face.face[room.face])
+        distance_m = np.full(len(unit), np.inf)
+        on_actor, on_room = np.flatnonzero(before), np.flatnonzero(~before & (room.face != NO_FACE))
+        planes = self._room_planes.take(room.face[on_room])
+        distance_m[on_room] = planes.along_m(eye_m, unit[on_room], room.distance_m[on_room])
+        planes = Planes.of(self._actors.corner_m(actors.face[on_actor]))
+        distance_m[on_actor] = planes.along_m(eye_m, unit[on_actor], actors.distance_m[on_actor])
         return SightHits(object_index, face, distance_m)
 
     def _go_to(self, frame: int) -> None:
-        if frame == self._frame:
-            return
-        for index, caster in self._actors.items():
-            caster.move_to(_at(self.meshes.moving_vertices_m[index], frame))
-        self._frame = frame
+        if frame != self._frame:
+            self._actors.move_to(self._actor_vertices_m(frame))
+            self._frame = frame
+
+    def _actor_vertices_m(self, frame: int) -> Float32[np.ndarray, "P 3"]:
+        vertices_m = [of_actor[frame] for of_actor in self.meshes.moving_vertices_m.values()]
+        return np.concatenate([np.zeros((0, 3), np.float32), *vertices_m])
 
 
-def _at(vertices_m: np.ndarray, frame: int) -> Float64[np.ndarray, "P 3"]:
-    return vertices_m[frame].astype(np.float64)
+def _joined_actor_faces(meshes: SceneMeshes) -> Int32[np.ndarray, "F 3"]:
+    first_vertex = np.cumsum([0] + [of_actor.shape[1] for of_actor in meshes.moving_vertices_m.values()])
+    faces = [mesh + start for mesh, start in zip(meshes.moving_faces.values(), first_vertex[:-1], strict=True)]
+    return np.concatenate([np.zeros((0, 3), np.int32), *faces]).astype(np.int32)
+
+
+@dataclass(frozen=True)
+class _FaceTable:
+    """Object and face within it of each face of joined meshes; the last entry, at ``NO_FACE``, is nothing's."""
+
+    owner: Int32[np.ndarray, " F"]
+    face: Int32[np.ndarray, " F"]
+
+    @classmethod
+    def of(cls, faces_of: dict[int, int]) -> "_FaceTable":
+        owners = [np.full(count, index, np.int32) for index, count in faces_of.items()]
+        faces = [np.arange(count, dtype=np.int32) for count in faces_of.values()]
+        nothing, no_face = np.array([NOTHING], np.int32), np.array([NO_FACE], np.int32)
+        return cls(np.concatenate([*owners, nothing]), np.concatenate([*faces, no_face]))
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Points fixed to triangles of the scene, and where those triangles are at each frame."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,9 +74,14 @@ class BoundPoints:
     def corner_m(self, frame: int) -> Float64[np.ndarray, "N 3 3"]:
         """World positions of the corners of each point's triangle."""
         corner_m = self.rest_corner_m.copy()
-        for group in self.moving:
-            corner_m[group.points] = group.vertices_m[frame][group.vertex]
+        for members, moved_m in self.moved_corner_m(frame):
+            corner_m[members] = moved_m
         return corner_m
+
+    def moved_corner_m(self, frame: int) -> Iterator[tuple[Int64[np.ndarray, " M"], Float64[np.ndarray, "M 3 3"]]]:
+        """Which points are on each actor, and the corners of their triangles at a frame."""
+        for group in self.moving:
+            yield group.points, group.vertices_m[frame][group.vertex].astype(np.float64)
 
     def point_m(self, frame: int) -> Float64[np.ndarray, "N 3"]:
         """World positions at one frame, the same bits as ``position_m`` has."""
@@ -87,10 +92,9 @@ class BoundPoints:
         weight = self.points.barycentric
         rest_m = np.einsum("nk,nkc->nc", weight, self.rest_corner_m)
         position_m = np.repeat(rest_m[None], frames, axis=0)
-        for group in self.moving:
-            for frame in range(frames):
-                corner_m = group.vertices_m[frame][group.vertex].astype(np.float64)
-                position_m[frame, group.points] = np.einsum("nk,nkc->nc", weight[group.points], corner_m)
+        for frame in range(frames):
+            for members, corner_m in self.moved_corner_m(frame):
+                position_m[frame, members] = np.einsum("nk,nkc->nc", weight[members], corner_m)
         return position_m
 
 

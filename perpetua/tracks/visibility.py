@@ -16,13 +16,15 @@ A point is visible where both say so. Where they differ it is hidden, and counte
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Float64, Int32, Int64, UInt16
+from jaxtyping import Bool, Float32, Float64, Int64, UInt16
 
 from perpetua.cameras.types import CameraPath
 from perpetua.geometry.pinhole import Intrinsics, inside_image, project
+from perpetua.geometry.planes import Planes
 from perpetua.geometry.transforms import invert_rigid, transform_points
 from perpetua.rendering.types import RenderedView
 from perpetua.tracks.config import TracksConfig
+from perpetua.tracks.placed import PlacedPoints, Placement, as_exported
 from perpetua.tracks.sides import ClosedSides
 from perpetua.tracks.sight import HairFaces, SceneSight, SightHits
 from perpetua.tracks.surface import BoundPoints
@@ -57,34 +59,11 @@ class ViewFrame:
 
 
 @dataclass(frozen=True)
-class PlacedPoints:
-    """Points at one frame: places and corners of their triangles in the world, as exported."""
-
-    point_m: Float64[np.ndarray, "N 3"]
-    corner_m: Float64[np.ndarray, "N 3 3"]
-    object_index: Int32[np.ndarray, " N"]
-    face: Int32[np.ndarray, " N"]
-    sides: ClosedSides
-
-    def take(self, chosen: Int64[np.ndarray, " M"]) -> "PlacedPoints":
-        """Some of the points."""
-        sides = ClosedSides(self.sides.closed[chosen], self.sides.box_m[chosen])
-        return PlacedPoints(
-            self.point_m[chosen], self.corner_m[chosen], self.object_index[chosen], self.face[chosen], sides
-        )
-
-
-@dataclass(frozen=True)
 class Sightings:
     """Where points are visible at the frames asked for, and how the witnesses agreed."""
 
     visible: Bool[np.ndarray, "C S N"]
     report: SightReport
-
-
-def as_exported(values: Float[np.ndarray, "*shape"]) -> Float64[np.ndarray, "*shape"]:
-    """The values that a reader of the files computes with: rounded to float32."""
-    return values.astype(np.float32).astype(np.float64)
 
 
 def exported_intrinsics(camera: CameraPath) -> Intrinsics:
@@ -109,15 +88,9 @@ def visible_in_views(
     intrinsics = [exported_intrinsics(camera) for camera in cameras]
     camera_from_world = [as_exported(invert_rigid(camera.world_from_camera)) for camera in cameras]
     report = SightReport()
+    placement = Placement(bound, sides)
     for place, frame in enumerate(frames.tolist()):
-        points = bound.points
-        placed = PlacedPoints(
-            as_exported(bound.point_m(frame)),
-            as_exported(bound.corner_m(frame)),
-            points.object_index,
-            points.face,
-            sides,
-        )
+        placed = placement.at(frame)
         for index, view in enumerate(views):
             seen = ViewFrame(
                 frame,
@@ -140,15 +113,17 @@ def visible_in_frame(
     points = placed.take(inside)
     around = _Around.of(pixel_px[inside], seen)
     shows = around.valid & (around.shown == points.object_index[:, None])
-    facing, cosine = _facing(points, seen)
-    offset_m = points.point_m - seen.centre_m
-    hits = sight.first_hit(seen.frame, np.broadcast_to(seen.centre_m, offset_m.shape).copy(), offset_m)
-    length_m = np.linalg.norm(offset_m, axis=1)
+    eye_m = seen.centre_m
+    offset_m = points.point_m - eye_m
+    hits = sight.first_hit(seen.frame, eye_m, offset_m)
+    length_m = np.sqrt(np.einsum("nc,nc->n", offset_m, offset_m))
+    height_m = points.planes.height_m(eye_m)
+    cosine = np.abs(height_m) / np.maximum(length_m, 1e-30)
     own = (hits.object_index == points.object_index) & (hits.face == points.face)
     reached = own | (hits.distance_m >= length_m * (1.0 - REACHED_SHARE) - REACHED_M)
-    turned = ~facing & _hides_its_back(points.sides, seen)
+    turned = (height_m <= 0.0) & points.sides.hide_back(eye_m)
     reached &= ~turned
-    agrees = (shows & _on_plane(points, around, seen, config)).any(axis=1)
+    agrees = (shows & _on_plane(points.planes, height_m, around, seen, config)).any(axis=1)
     unsure = np.flatnonzero(reached & ~agrees & shows.any(axis=1))
     reach_m = NEIGHBOUR_PX * length_m / seen.intrinsics.fx_px / np.maximum(cosine, GRAZING_COSINE)
     agrees[unsure] = _on_neighbours(points.point_m, reach_m, unsure, shows, around, seen, sight)
@@ -183,23 +158,13 @@ class _Around:
         return np.stack([x, y, np.ones(x.shape)], axis=2)
 
 
-def _facing(points: PlacedPoints, seen: ViewFrame) -> tuple[Bool[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
-    """Whether each point's triangle turns its front to the camera, and the cosine of the angle it is seen at."""
-    corner_m = points.corner_m
-    normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
-    towards = seen.centre_m - points.point_m
-    along = np.einsum("nc,nc->n", normal, towards)
-    size = np.linalg.norm(normal, axis=1) * np.linalg.norm(towards, axis=1)
-    return along > 0.0, np.abs(along) / np.maximum(size, 1e-30)
-
-
-def _on_plane(points: PlacedPoints, around: _Around, seen: ViewFrame, config: TracksConfig) -> Bool[np.ndarray, "N 4"]:
+def _on_plane(
+    planes: Planes, height_m: Float64[np.ndarray, " N"], around: _Around, seen: ViewFrame, config: TracksConfig
+) -> Bool[np.ndarray, "N 4"]:
     """Whether rendered depth is that of each point's own plane along the rays of the pixel centres."""
-    corner_m = transform_points(seen.camera_from_world, points.corner_m.reshape(-1, 3)).reshape(-1, 3, 3)
-    normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
+    normal = planes.normal @ seen.camera_from_world[:3, :3].T
     with np.errstate(divide="ignore", invalid="ignore"):
-        plane_m = np.einsum("nc,nc->n", normal, corner_m[:, 0])[:, None]
-        plane_m = plane_m / np.einsum("nc,nkc->nk", normal, around.rays(seen.intrinsics))
+        plane_m = -height_m[:, None] / np.einsum("nc,nkc->nk", normal, around.rays(seen.intrinsics))
         in_front_m = plane_m - around.depth_m
         return np.asarray(
             np.isfinite(plane_m)
@@ -222,7 +187,7 @@ def _on_neighbours(
     member, corner = np.nonzero(shows[chosen])
     ray = around.rays(seen.intrinsics)[chosen[member], corner]
     direction = ray @ seen.camera_from_world[:3, :3]
-    hits = sight.first_hit(seen.frame, np.broadcast_to(seen.centre_m, direction.shape).copy(), direction)
+    hits = sight.first_hit(seen.frame, seen.centre_m, direction)
     meshed_m = hits.distance_m / np.linalg.norm(ray, axis=1)
     rendered_m = around.depth_m[chosen[member], corner]
     same = np.abs(meshed_m - rendered_m) <= SAME_DEPTH_M + SAME_DEPTH_SHARE * rendered_m
@@ -232,12 +197,6 @@ def _on_neighbours(
     confirmed = np.zeros(len(chosen), bool)
     np.logical_or.at(confirmed, member, same)
     return confirmed
-
-
-def _hides_its_back(sides: ClosedSides, seen: ViewFrame) -> Bool[np.ndarray, " N"]:
-    """Closed surfaces hide their backs from cameras outside; a closed room is seen from inside."""
-    inside = ((seen.centre_m >= sides.box_m[:, 0]) & (seen.centre_m <= sides.box_m[:, 1])).all(axis=1)
-    return np.asarray(sides.closed & ~inside)
 
 
 def _count(

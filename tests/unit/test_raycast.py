@@ -6,6 +6,7 @@ import trimesh
 from jaxtyping import Float64
 
 from perpetua.geometry.mesh import TriMesh, join
+from perpetua.geometry.planes import Planes
 from perpetua.geometry.raycast import NO_FACE, Caster, MovingCaster
 
 
@@ -101,23 +102,52 @@ def test_an_empty_mesh_blocks_nothing() -> None:
     assert caster.closest_distance(origins, 3.0).tolist() == [3.0]
 
 
-def test_a_moving_mesh_is_hit_where_it_is_now_as_embree_hits_it(scene: TriMesh) -> None:
-    moving = MovingCaster(scene)
+def test_a_moving_mesh_is_met_where_it_is_now_as_embree_meets_it(scene: TriMesh) -> None:
+    moving = MovingCaster(scene.vertices_m.astype(np.float32), scene.faces)
     rng = np.random.default_rng(3)
     for shift_m in (0.0, 0.7, -1.3):
-        moved = TriMesh(scene.vertices_m * (1.0 + 0.1 * shift_m) + shift_m, scene.faces)
-        moving.move_to(moved.vertices_m)
+        moved_m = (scene.vertices_m * (1.0 + 0.1 * shift_m) + shift_m).astype(np.float32)
+        moving.move_to(moved_m)
+        moved = Caster(TriMesh(moved_m.astype(np.float64), scene.faces))
         # From inside and from outside, some of them past the mesh.
-        origins, directions = 1.4 * _points(800) + shift_m, rng.normal(size=(800, 3))
-        wanted, found = Caster(moved).first_hit(origins, directions), moving.first_hit(origins, directions)
-        assert 0.3 < wanted.hit.mean() < 0.9
-        np.testing.assert_array_equal(found.hit, wanted.hit)
-        np.testing.assert_array_equal(found.face, wanted.face)
-        np.testing.assert_allclose(found.distance_m, wanted.distance_m, rtol=1e-12)
-        np.testing.assert_allclose(found.barycentric, wanted.barycentric, atol=2e-4)
+        for eye_m in 1.4 * _points(4) + shift_m:
+            direction = rng.normal(size=(300, 3))
+            direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+            found, rough = (
+                moving.meet(eye_m, direction.astype(np.float32)),
+                moved.meet(eye_m, direction.astype(np.float32)),
+            )
+            wanted = moved.first_hit(np.repeat(eye_m[None], 300, axis=0), direction)
+            assert wanted.hit.sum() > 0
+            for one in (found, rough):
+                np.testing.assert_array_equal(one.face, wanted.face)
+                np.testing.assert_allclose(one.distance_m, wanted.distance_m, rtol=1e-5)
+            hit = wanted.hit
+            planes = Planes.of(moving.corner_m(found.face[hit]))
+            exact_m = planes.along_m(eye_m, direction[hit], found.distance_m[hit])
+            np.testing.assert_allclose(exact_m, wanted.distance_m[hit], rtol=1e-12)
 
 
-def test_a_moving_mesh_that_no_ray_comes_near() -> None:
-    ball = MovingCaster(_mesh(trimesh.creation.icosphere(2, 1.0)))
-    away = ball.first_hit(np.array([[0.0, 0, 5], [0.0, 3, 5]]), np.array([[0.0, 0, 2], [0.0, 0, -2]]))
-    assert not away.hit.any() and np.isinf(away.distance_m).all()
+def test_rays_that_meet_nothing_and_meshes_without_faces() -> None:
+    ball, eye_m = _mesh(trimesh.creation.icosphere(2, 1.0)), np.array([0.0, 3, 5])
+    unit = np.array([[0.0, 0, 1], [0.0, 0, -1]], np.float32)
+    empty = np.zeros((0, 3), np.int32)
+    for caster in (
+        MovingCaster(ball.vertices_m.astype(np.float32), ball.faces),
+        MovingCaster(np.zeros((0, 3), np.float32), empty),
+        Caster(ball),
+        Caster(join([])),
+    ):
+        away = caster.meet(eye_m, unit)
+        assert (away.face == NO_FACE).all() and np.isinf(away.distance_m).all()
+        assert len(caster.meet(eye_m, unit[:0]).face) == 0
+
+
+def test_planes_along_rays() -> None:
+    corner_m = np.array([[[0.0, 0, 2], [1, 0, 2], [0, 1, 2]], [[0.0, 0, 0], [0, 1, 0], [0, 0, 1]], [[1.0, 1, 1]] * 3])
+    planes = Planes.of(corner_m)
+    np.testing.assert_array_equal(planes.normal, [[0, 0, 1], [1, 0, 0], [0, 0, 0]])
+    assert planes.height_m(np.array([0.3, 0.0, 5.0])).tolist() == [3.0, 0.3, 0.0]
+    down = np.array([[0.0, 0, -1], [0.0, 0, -1], [0.0, 0, -1]])
+    # The second ray runs along its plane, and the third triangle has none: what was found roughly counts.
+    assert planes.along_m(np.array([0.3, 0.0, 5.0]), down, np.full(3, 9, np.float32)).tolist() == [3.0, 9.0, 9.0]

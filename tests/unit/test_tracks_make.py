@@ -11,7 +11,7 @@ from synthetic_sequence import make_scene_tracks
 from perpetua.errors import TrackError
 from perpetua.tracks.candidates import ActorSurfaces
 from perpetua.tracks.config import TracksConfig
-from perpetua.tracks.motion import travel_m
+from perpetua.tracks.motion import is_fast, travel_m
 from perpetua.tracks.queries import draw_queries
 from perpetua.tracks.selection import spread
 from perpetua.tracks.types import SequenceTracks, ViewTracks
@@ -138,3 +138,43 @@ def test_spread_prefers_what_is_rare() -> None:
     in_cell = np.bincount(np.array([0] * 50 + [1] * 45 + [2] * 5)[chosen], minlength=3)
     assert (in_cell >= 3).all(), in_cell
     assert sorted(spread(100, objects, cells, np.random.default_rng(0)).tolist()) == list(range(100))
+
+
+def test_some_of_the_chosen_may_be_reserved() -> None:
+    objects, reserved = np.ones(100, np.int32), np.arange(100) >= 95
+    cells = csr_matrix(np.ones((100, 1)))
+
+    def chosen(wanted: int, least: int) -> list[int]:
+        return spread(wanted, objects, cells, np.random.default_rng(1), reserved, least).tolist()
+
+    assert set(chosen(20, 4)) & set(range(95, 100)) >= set(chosen(4, 4)) and len(set(chosen(20, 4))) == 20
+    assert set(chosen(20, 50)) > set(range(95, 100)), "there are no more"
+    assert set(chosen(3, 50)) < set(range(95, 100))
+    assert sorted(chosen(100, 4)) == list(range(100))
+    assert chosen(0, 4) == []
+
+
+def test_fast_points_go_two_metres_within_a_second() -> None:
+    time = np.arange(60.0)
+    speed_m = np.array([0.09, 0.08, 0.0, 0.5])
+    position_m = np.zeros((60, 4, 3))
+    position_m[:, :3, 0] = time[:, None] * speed_m[:3]
+    # Back and forth: far from the first frame only for a moment.
+    position_m[30, 3, 1] = 2.1
+    assert is_fast(position_m, travel_m(position_m)).tolist() == [True, False, False, True]
+    assert not is_fast(position_m[:1], travel_m(position_m[:1])).any()
+
+
+def test_fast_tracks_get_their_share_as_far_as_there_are_any() -> None:
+    """The first actor moved off by 2.5 m at the end: its points are fast; the other's are not."""
+    scene = make_scene()
+    vertices_m = scene.actors[0].vertices_m.copy()
+    vertices_m[5, :, 2] += 2.5
+    scene = dataclasses.replace(
+        scene, actors=(dataclasses.replace(scene.actors[0], vertices_m=vertices_m), scene.actors[1])
+    )
+    fast = {}
+    for share in (0.0, 0.28, 0.9):
+        points = make_scene_tracks(scene, TracksConfig(count=100, fast_share=share)).points
+        fast[share] = int(is_fast(points.position_m, travel_m(points.position_m)).sum())
+    assert fast[0.0] < 20 and 28 <= fast[0.28] < 30 and fast[0.9] == 30, fast

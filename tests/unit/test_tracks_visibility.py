@@ -8,11 +8,13 @@ from synthetic_sequence import make_scene_tracks
 
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.pinhole import Intrinsics, inside_image, project
+from perpetua.geometry.planes import Planes
 from perpetua.tracks.config import TracksConfig
+from perpetua.tracks.placed import PlacedPoints
 from perpetua.tracks.sides import ClosedSides, closed_sides
 from perpetua.tracks.sight import HairFaces, SceneSight, SightHits
 from perpetua.tracks.surface import SceneMeshes, plane_barycentric
-from perpetua.tracks.visibility import PlacedPoints, ViewFrame, visible_in_frame
+from perpetua.tracks.visibility import ViewFrame, visible_in_frame
 
 CONFIG = TracksConfig()
 CAMERA = Intrinsics.centred(64, 48, 1.2)
@@ -43,15 +45,15 @@ class ClearSight(SceneSight):
     def __init__(self) -> None:
         super().__init__(SceneMeshes({}, {}, {}))
 
-    def first_hit(self, frame: int, origins_m: np.ndarray, directions: np.ndarray) -> SightHits:
-        nothing = np.zeros(len(origins_m), np.int32)
-        return SightHits(nothing, nothing, np.full(len(origins_m), np.inf))
+    def first_hit(self, frame: int, eye_m: np.ndarray, directions: np.ndarray) -> SightHits:
+        nothing = np.zeros(len(directions), np.int32)
+        return SightHits(nothing, nothing, np.full(len(directions), np.inf))
 
 
 def placed(points: np.ndarray, corners: np.ndarray, sides: ClosedSides | None = None) -> PlacedPoints:
     count = len(points)
     index, face = np.full(count, 7, np.int32), np.arange(count, dtype=np.int32)
-    return PlacedPoints(points, corners, index, face, open_sides(count) if sides is None else sides)
+    return PlacedPoints(points, Planes.of(corners), index, face, open_sides(count) if sides is None else sides)
 
 
 def visible(

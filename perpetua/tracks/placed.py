@@ -1,0 +1,55 @@
+"""Points and the planes of their triangles in the world, frame by frame, rounded as a reader of the files has them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Float64, Int32, Int64
+
+from perpetua.geometry.planes import Planes
+from perpetua.tracks.sides import ClosedSides
+from perpetua.tracks.surface import BoundPoints
+
+
+def as_exported(values: Float[np.ndarray, "*shape"]) -> Float64[np.ndarray, "*shape"]:
+    """The values that a reader of the files computes with: rounded to float32."""
+    return values.astype(np.float32).astype(np.float64)
+
+
+@dataclass(frozen=True)
+class PlacedPoints:
+    """Points at one frame: places and planes of their triangles in the world."""
+
+    point_m: Float64[np.ndarray, "N 3"]
+    planes: Planes
+    object_index: Int32[np.ndarray, " N"]
+    face: Int32[np.ndarray, " N"]
+    sides: ClosedSides
+
+    def take(self, chosen: Int64[np.ndarray, " M"] | Bool[np.ndarray, " N"]) -> "PlacedPoints":
+        """Some of the points."""
+        return PlacedPoints(
+            self.point_m[chosen],
+            self.planes.take(chosen),
+            self.object_index[chosen],
+            self.face[chosen],
+            self.sides.take(chosen),
+        )
+
+
+class Placement:
+    """Puts points where they are at a frame; what never moves is computed once."""
+
+    def __init__(self, bound: BoundPoints, sides: ClosedSides) -> None:
+        self._bound, self._sides = bound, sides
+        self._point_m = as_exported(bound.point_m(0))
+        self._planes = Planes.of(as_exported(bound.corner_m(0)))
+
+    def at(self, frame: int) -> PlacedPoints:
+        """The points at a frame."""
+        for members, corner_m in self._bound.moved_corner_m(frame):
+            weight = self._bound.points.barycentric[members]
+            self._point_m[members] = as_exported(np.einsum("nk,nkc->nc", weight, corner_m))
+            planes = Planes.of(as_exported(corner_m))
+            self._planes.normal[members], self._planes.offset_m[members] = planes.normal, planes.offset_m
+        points = self._bound.points
+        return PlacedPoints(self._point_m, self._planes, points.object_index, points.face, self._sides)
