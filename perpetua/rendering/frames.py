@@ -18,6 +18,10 @@ from perpetua.rendering.types import RenderedView
 BACKGROUND_DEPTH_M = 1e9
 
 
+class DamagedFrameError(RenderError):
+    """A frame that is as the worker left it, and still no picture of the job."""
+
+
 @dataclass(frozen=True)
 class GroundTruth:
     """One frame of one view; depth is 0 and index is 0 where there is no object."""
@@ -62,7 +66,7 @@ def read_ground_truth(path: Path) -> GroundTruth:
     """Depth and object index of one image, from the EXR that the render worker wrote.
 
     Raises:
-        RenderError: the file is no such EXR.
+        DamagedFrameError: the file is no such EXR.
     """
     try:
         with OpenEXR.File(str(path)) as file:
@@ -70,9 +74,7 @@ def read_ground_truth(path: Path) -> GroundTruth:
             raw_depth_m = np.asarray(channels["depth.V"].pixels)
             raw_index = np.asarray(channels["index.V"].pixels)
     except (RuntimeError, OSError, KeyError, ValueError) as error:
-        raise RenderError(
-            f"'{path}' must be an EXR with channels depth.V and index.V: {error}; delete its folder and run again"
-        ) from None
+        raise DamagedFrameError(f"'{path}' must be an EXR with channels depth.V and index.V: {error}") from None
     seen = (raw_index > 0.5) & (raw_depth_m < BACKGROUND_DEPTH_M)
     return GroundTruth(
         np.where(seen, raw_depth_m, 0.0).astype(np.float32), np.where(seen, np.rint(raw_index), 0).astype(np.uint16)
@@ -80,7 +82,11 @@ def read_ground_truth(path: Path) -> GroundTruth:
 
 
 def assemble_view(frames: Path, camera: CameraPath, count: int, folder: Path) -> RenderedView:
-    """One view's frames as arrays that stay on disk, in ``folder``, and are mapped read-only."""
+    """One view's frames as arrays that stay on disk, in ``folder``, and are mapped read-only.
+
+    Raises:
+        DamagedFrameError: a frame is not what a worker writes; it was removed, so that it is rendered again.
+    """
     height, width = camera.intrinsics.height_px, camera.intrinsics.width_px
     shape = (count, height, width)
     depth_path = folder / f"depth_m_{camera.camera:02d}.npy"
@@ -90,12 +96,11 @@ def assemble_view(frames: Path, camera: CameraPath, count: int, folder: Path) ->
     jpeg = []
     for frame in range(count):
         source = frame_folder(frames, frame)
-        truth = read_ground_truth(source / _exr_name(camera))
-        if truth.depth_m.shape != (height, width):
-            raise RenderError(
-                f"frame {frame} of view {camera.camera} must be {width}x{height} px, not "
-                f"{truth.depth_m.shape[1]}x{truth.depth_m.shape[0]}; delete '{source}' and run again"
-            )
+        try:
+            truth = _ground_truth_of(source, camera)
+        except DamagedFrameError:
+            shutil.rmtree(source, ignore_errors=True)
+            raise
         depth_m[frame], object_index[frame] = truth.depth_m, truth.object_index
         jpeg.append((source / _jpeg_name(camera)).read_bytes())
     depth_m.flush()
@@ -103,6 +108,15 @@ def assemble_view(frames: Path, camera: CameraPath, count: int, folder: Path) ->
     return RenderedView(
         camera.camera, tuple(jpeg), np.load(depth_path, mmap_mode="r"), np.load(index_path, mmap_mode="r")
     )
+
+
+def _ground_truth_of(source: Path, camera: CameraPath) -> GroundTruth:
+    path = source / _exr_name(camera)
+    truth = read_ground_truth(path)
+    wanted, found = (camera.intrinsics.height_px, camera.intrinsics.width_px), truth.depth_m.shape
+    if found != wanted:
+        raise DamagedFrameError(f"'{path}' must be {wanted[1]}x{wanted[0]} px, not {found[1]}x{found[0]}")
+    return truth
 
 
 def _jpeg_name(camera: CameraPath) -> str:

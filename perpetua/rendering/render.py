@@ -13,7 +13,7 @@ from perpetua.errors import RenderError
 from perpetua.files import write_json
 from perpetua.rendering.bake import bake_room
 from perpetua.rendering.config import RenderConfig
-from perpetua.rendering.frames import assemble_view, drop_damaged
+from perpetua.rendering.frames import DamagedFrameError, assemble_view, drop_damaged
 from perpetua.rendering.job import FRAME_FOLDER, PENDING_FILE, RENDER_SCRIPT, write_job
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.types import Room
@@ -67,9 +67,17 @@ def render_views(
     if room.blend_path is not None:
         room = replace(room, blend_path=bake_room(room, config, frame_count * len(cameras), work_dir))
     job_path = write_job(work_dir, room, actors, cameras, config, device, near_m)
-    _render_pending(job_path, cameras, frame_count, config, on_frame, script)
     frames = work_dir / FRAME_FOLDER
-    return tuple(assemble_view(frames, camera, frame_count, result_dir or work_dir) for camera in cameras)
+    repeats = 0
+    while True:
+        _render_pending(job_path, cameras, frame_count, config, on_frame, script)
+        try:
+            return tuple(assemble_view(frames, camera, frame_count, result_dir or work_dir) for camera in cameras)
+        except DamagedFrameError as error:
+            if repeats == config.max_restarts:
+                raise
+            repeats += 1
+            logger.warning("%s; it was removed and is rendered again", error)
 
 
 def _check_job(room: Room, actors: tuple[ActorMesh, ...], cameras: tuple[CameraPath, ...], device: str) -> int:

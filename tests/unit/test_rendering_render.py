@@ -1,6 +1,6 @@
 """The parent's side of rendering, with workers that need no Blender: resume, restarts, damage, changed jobs."""
 
-import json
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -159,17 +159,41 @@ def test_damaged_frames_are_found_and_removed(tmp_path: Path, config: RenderConf
     assert [jpeg[-1:] for jpeg in views[0].jpeg] == [b"0", b"0", b"1", b"0"]
 
 
-def test_a_file_that_is_no_exr_is_an_error_of_its_own(tmp_path: Path, config: RenderConfig) -> None:
-    _render(tmp_path / "work", _worker(tmp_path), config, [])
-    folder = frame_folder(tmp_path / "work" / "frames", 0)
-    content = json.loads((folder / "frame.json").read_text())
-    # A file that matches its fingerprint and still is no picture: a fault of the worker, not of the disk.
-    (folder / "view_00.exr").write_bytes(b"")
-    empty = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
-    content["files"]["view_00.exr"] = {"bytes": 0, "sha256": empty}
-    (folder / "frame.json").write_text(json.dumps(content))
+GARBAGE = """
+    made = write
+    def write(frame):
+        made(frame)
+        if frame == 1 and tries < BAD_TRIES:
+            path = folder / "frames" / f"{frame:06d}" / "view_00.exr"
+            path.write_bytes(CONTENT)
+            record = json.loads((path.parent / "frame.json").read_text())
+            digest = hashlib.sha256(path.read_bytes()).hexdigest()
+            record["files"][path.name] = {"bytes": path.stat().st_size, "sha256": digest}
+            (path.parent / "frame.json").write_text(json.dumps(record))
+"""
+
+
+def _garbage_worker(tmp_path: Path, content: str, bad_tries: int) -> Path:
+    """Writes a file that matches its fingerprint and still is no picture: a fault of Blender's, not of the disk."""
+    script = _worker(tmp_path)
+    garbage = textwrap.dedent(GARBAGE).replace("CONTENT", content).replace("BAD_TRIES", str(bad_tries))
+    before, loop, after = script.read_text().rpartition("for frame in json")
+    script.write_text(before + garbage + loop + after)
+    return script
+
+
+@pytest.mark.parametrize("content", ["b''", "b'\\x76\\x2f\\x31\\x01' + bytes(50)", "path.read_bytes()[:-40]"])
+def test_garbage_is_rendered_again(tmp_path: Path, config: RenderConfig, content: str) -> None:
+    views = _render(tmp_path / "work", _garbage_worker(tmp_path, content, 1), config, [])
+    assert [jpeg[-1:] for jpeg in views[0].jpeg] == [b"0", b"1", b"0", b"0"]
+
+
+def test_garbage_without_end_is_an_error_that_leaves_the_other_frames(tmp_path: Path, config: RenderConfig) -> None:
     with pytest.raises(RenderError, match=r"view_00\.exr' must be an EXR"):
-        _render(tmp_path / "work", _worker(tmp_path), config, [])
+        _render(tmp_path / "work", _garbage_worker(tmp_path, "b''", 99), config, [])
+    assert len(list((tmp_path / "work").glob("try_*"))) == config.max_restarts + 1
+    views = _render(tmp_path / "work", _worker(tmp_path), config, [])
+    assert [jpeg[-1:] for jpeg in views[0].jpeg] == [b"0", b"3", b"0", b"0"]
 
 
 def test_another_job_discards_frames_but_another_time_out_does_not(tmp_path: Path, config: RenderConfig) -> None:
