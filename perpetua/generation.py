@@ -15,6 +15,7 @@ from perpetua.cluster.local import raise_on_sigterm, run_rooms
 from perpetua.config import Config
 from perpetua.errors import ConfigError, InputError, PerpetuaError
 from perpetua.files import read_json
+from perpetua.formats.reader import read_sequence
 from perpetua.pictures.contact_sheet import write_contact_sheet
 from perpetua.pipeline.cost import Cost, check_disk, estimate_cost, gigabytes
 from perpetua.pipeline.events import OnEvent
@@ -90,7 +91,7 @@ def make_room(request: GenerateRequest, until: str, room: int, on_event: OnEvent
         if not layout.contact_sheet.exists():
             partial_sheet = layout.contact_sheet.with_name(f".{layout.contact_sheet.name}")
             layout.contact_sheet.parent.mkdir(parents=True, exist_ok=True)
-            write_contact_sheet(layout.sequence_folder, partial_sheet)
+            write_contact_sheet(read_sequence(layout.sequence_folder), partial_sheet)
             partial_sheet.replace(layout.contact_sheet)
 
 

@@ -15,7 +15,6 @@ Rerun counts pixels from the corner of the top-left one, so pixels are half a pi
 the time of its making, so equal sequences do not give equal bytes.
 """
 
-import colorsys
 import re
 from dataclasses import dataclass
 from importlib import import_module
@@ -139,11 +138,5 @@ def _tracks_by_object(source: ExportSource) -> dict[str, Int64[np.ndarray, " _"]
 
 def _track_colours(source: ExportSource) -> UInt8[np.ndarray, "P 3"]:
     """One colour per object: people bright, things pale."""
-    palette = {index: _colour(index, index in source.people) for index in np.unique(source.track_object).tolist()}
+    palette = {index: source.object_colour(index) for index in np.unique(source.track_object).tolist()}
     return np.array([palette[index] for index in source.track_object.tolist()], np.uint8).reshape(-1, 3)
-
-
-def _colour(index: int, person: bool) -> tuple[int, int, int]:
-    # Steps of the golden ratio keep neighbouring indices far apart in hue.
-    red, green, blue = colorsys.hsv_to_rgb(index * 0.618034 % 1.0, 0.9 if person else 0.35, 1.0 if person else 0.8)
-    return round(255 * red), round(255 * green), round(255 * blue)

@@ -1,5 +1,6 @@
 """What an exporter is: it writes a finished sequence once more, in the layout of another reader."""
 
+import colorsys
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -83,6 +84,13 @@ class ExportSource:
         if not self._objects:
             return frozenset({1})
         return frozenset(int(thing["object_index"]) for thing in self._objects if thing["category"] == PERSON)
+
+    def object_colour(self, index: int) -> tuple[int, int, int]:
+        """A colour that tells an object from others: people bright, things pale."""
+        # Steps of the golden ratio keep neighbouring indices far apart in hue.
+        person = index in self.people
+        red, green, blue = colorsys.hsv_to_rgb(index * 0.618034 % 1.0, 0.9 if person else 0.35, 1.0 if person else 0.8)
+        return round(255 * red), round(255 * green), round(255 * blue)
 
     @property
     def _objects(self) -> list[dict[str, Any]]:

@@ -13,7 +13,7 @@ from matplotlib.patches import Polygon
 from perpetua.audit.geometry import camera_centre_m, moves_more_than
 from perpetua.files import read_json
 from perpetua.formats.layout import AUDIT
-from perpetua.formats.reader import Sequence, SequenceView, read_sequence
+from perpetua.formats.reader import Sequence, SequenceView
 
 FRUSTUM_M = 0.7
 FRUSTA = 5
@@ -35,17 +35,13 @@ CURVES = (
 )
 
 
-def write_plan_view(sequence_folder: Path, picture: Path) -> None:
+def write_plan_view(sequence: Sequence, picture: Path) -> None:
     """Writes a picture: room, routes with their pauses, camera paths with frusta over time, curves beside it.
 
     What a sequence does not record is left out: one that Perpetua did not make shows its tracks and cameras.
-
-    Raises:
-        SequenceFormatError: the sequence cannot be read.
     """
-    sequence = read_sequence(sequence_folder)
     record = sequence.record or {}
-    curves = read_json(sequence_folder / AUDIT).get("motion", {}).get("curves", {})
+    curves = read_json(sequence.folder / AUDIT).get("motion", {}).get("curves", {})
     figure = Figure(figsize=(15.0 if curves else 8.5, 9.0), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(len(CURVES), 2 if curves else 1, width_ratios=(1.4, 1.0) if curves else (1.0,))
@@ -54,7 +50,7 @@ def write_plan_view(sequence_folder: Path, picture: Path) -> None:
     _draw_people(plan, sequence, record)
     for number, view in enumerate(sequence.views):
         _draw_camera(plan, view, number)
-    _dress(plan, sequence_folder.absolute().name, record)
+    _dress(plan, sequence.folder.resolve().name, record)
     if curves:
         _draw_curves([figure.add_subplot(grid[row, 1]) for row in range(len(CURVES))], curves, record)
     # Outside the axes, where the layout makes room for it.

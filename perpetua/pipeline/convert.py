@@ -10,6 +10,16 @@ from perpetua.formats.source import ExportSource
 from perpetua.pipeline.kept import kept_object_index
 
 
+def load_source(sequence_folder: Path) -> ExportSource:
+    """A finished sequence, with the rendered object index where its work area is kept.
+
+    Raises:
+        SequenceFormatError: the sequence is damaged.
+    """
+    name = sequence_folder.resolve().name
+    return ExportSource(name, read_sequence(sequence_folder), kept_object_index(sequence_folder))
+
+
 def export_sequence(sequence_folder: Path, export_format: str, target: Path) -> list[Path]:
     """Writes a sequence into the folder ``target`` in another layout; returns what it added there.
 
@@ -24,7 +34,7 @@ def export_sequence(sequence_folder: Path, export_format: str, target: Path) -> 
     """
     exporter = EXPORTERS[export_format]()
     name = sequence_folder.resolve().name
-    source = ExportSource(name, read_sequence(sequence_folder), kept_object_index(sequence_folder))
+    source = load_source(sequence_folder)
     partial = target / f".{name}.{export_format}.partial"
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)

@@ -61,9 +61,9 @@ def test_standard_is_the_default_preset(tmp_path: Path) -> None:
         (("clean", "--out", "no-such-folder"), "holds no run of perpetua"),
         (("verify", "no-such-folder"), "no-such-folder"),
         (("preview", "no-such-folder"), "no-such-folder"),
-        (("preview",), "preview needs the folder of a sequence, or --actors N"),
+        (("preview",), "preview needs one of: the folder of a sequence, --actors N, --rooms N"),
         (("preview", "--actors", "0"), "0 is not in the range x>=1"),
-        (("preview", ".", "--out", "sheet.gif"), "a picture must end in .png or .jpg, not 'sheet.gif'"),
+        (("preview", "--actors", "1", "--out", "sheet.gif"), "a picture must end in .png or .jpg, not 'sheet.gif'"),
     ],
 )
 def test_bad_input_gives_a_clear_error_and_exit_code_2(
