@@ -36,6 +36,7 @@ for command in (
     check.verify,
     check.evaluate,
     look.preview,
+    look.view,
     convert.tracks,
     convert.export,
     machine.assets,

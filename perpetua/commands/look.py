@@ -1,5 +1,6 @@
 """Commands that draw pictures."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -91,3 +92,32 @@ def _preview_sequence(sequence: Path, out: Path | None, only: tuple[str, ...], t
         )
     folder = out if out is not None else Path("previews") / sequence.resolve().name
     write_previews(sequence, folder, only, times, click.echo)
+
+
+@click.command()
+@click.argument("sequence", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.rrd",
+              help="Write a recording instead of opening the viewer.")  # fmt: skip
+def view(sequence: Path, out: Path | None) -> None:
+    """Look at a sequence in Rerun: cameras, images, depth, tracks; meshes while the run's work area is kept.
+
+    Opens Rerun's viewer. Without a display, or with --out, writes a recording for it: <sequence>.rrd.
+    """
+    from perpetua.formats.rerun_recording import open_viewer, save_recording
+    from perpetua.pipeline.convert import load_source
+
+    if out is not None and out.suffix != ".rrd":
+        raise InputError(f"a recording must end in .rrd, not '{out.name}'")
+    source = load_source(sequence)
+    if out is None and _has_display():
+        open_viewer(source)
+        click.echo(f"Rerun's viewer shows '{source.name}'")
+        return
+    target = Path(f"{source.name}.rrd") if out is None else out
+    save_recording(source, target)
+    click.echo(f"wrote {target}; to look at it: {Path(sys.executable).with_name('rerun')} {target}")
+
+
+def _has_display() -> bool:
+    """Whether a window can be opened; only Linux may have none."""
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -1,8 +1,8 @@
-"""Exporter of Rerun recordings: cameras, images, depth and tracks on a timeline, to look at in Rerun's viewer.
+"""Rerun recordings: cameras, images, depth, meshes and tracks on a timeline, to look at in Rerun's viewer.
 
 ::
 
-    <sequence>.rrd, timelines "frame" and "time"
+    <sequence>.rrd, timelines "frame" and "time" (seconds)
         world                          right-handed, Z up, metres
         world/view_<i>                 pose of the camera, at every frame
         world/view_<i>/image           pinhole; the JPEG of the frame
@@ -10,12 +10,13 @@
         world/view_<i>/depth           pinhole; depth along Z, rounded to millimetres
         world/tracks/<object>          positions of the tracks on an object, in the object's colour
         world/trails                   where the moving tracks were in the last frames
+        world/room, world/shell        meshes of the room, its walls and ceiling apart   } where the run's
+        world/people                   meshes of the people, at every frame              } work area is kept
 
 Rerun counts pixels from the corner of the top-left one, so pixels are half a pixel more than ours. A recording holds
 the time of its making, so equal sequences do not give equal bytes.
 """
 
-import re
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -25,7 +26,9 @@ import numpy as np
 from jaxtyping import Float64, Int64, UInt8
 
 from perpetua.errors import EnvironmentSetupError
-from perpetua.formats.source import EXPORTERS, HALF_PIXEL_PX, ExportSource, image_size_px
+from perpetua.formats.rerun_layout import viewer_layout
+from perpetua.formats.rerun_meshes import entity_name, still_meshes, vertex_colours, vertex_normals
+from perpetua.formats.source import EXPORTERS, HALF_PIXEL_PX, ExportSource, KeptMeshes, image_size_px
 from perpetua.geometry.transforms import invert_rigid
 
 TRAIL_FRAMES = 12
@@ -44,22 +47,65 @@ class RerunRecording:
         Raises:
             EnvironmentSetupError: Rerun's SDK is not installed.
         """
-        rr = _sdk()
-        stream = rr.RecordingStream("perpetua", recording_id=source.name)
-        stream.save(str(folder / f"{source.name}.rrd"))
-        stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        pixels_px = tuple(source.track_pixel_px(view) for view in range(len(source.sequence.views)))
-        recording = _Recording(rr, stream, source, pixels_px, _track_colours(source), _tracks_by_object(source))
+        save_recording(source, folder / f"{source.name}.rrd")
+
+
+def save_recording(source: ExportSource, target: Path) -> None:
+    """Writes a recording.
+
+    Raises:
+        EnvironmentSetupError: Rerun's SDK is not installed.
+    """
+    rr = _sdk()
+    stream = rr.RecordingStream("perpetua", recording_id=source.name)
+    stream.save(str(target), default_blueprint=viewer_layout(source))
+    _record(rr, stream, source)
+
+
+def open_viewer(source: ExportSource) -> None:
+    """Starts Rerun's viewer, or takes the one that runs, and sends it the recording.
+
+    Raises:
+        EnvironmentSetupError: Rerun's SDK is not installed, or its viewer does not start.
+    """
+    rr = _sdk()
+    stream = rr.RecordingStream("perpetua", recording_id=source.name)
+    try:
+        stream.spawn(default_blueprint=viewer_layout(source))
+    except (RuntimeError, OSError) as error:
+        raise EnvironmentSetupError(
+            f"Rerun's viewer does not start ({error}): give --out FILE.rrd, and open that file elsewhere"
+        ) from None
+    _record(rr, stream, source)
+
+
+def _sdk() -> Any:
+    try:
+        return import_module("rerun")
+    except ImportError:
+        raise EnvironmentSetupError(
+            "a Rerun recording needs Rerun's SDK, which is not installed: pip install 'perpetua[rerun]'"
+        ) from None
+
+
+def _record(rr: Any, stream: Any, source: ExportSource) -> None:
+    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    pixels_px = tuple(source.track_pixel_px(view) for view in range(len(source.sequence.views)))
+    recording = _Recording(rr, stream, source, pixels_px, _track_colours(source), _tracks_by_object(source))
+    for view in range(len(source.sequence.views)):
+        recording.log_pinholes(view)
+    if source.meshes is not None:
+        recording.log_still_meshes(source.meshes)
+    for frame in range(len(source.sequence.tracks_m)):
+        stream.set_time("frame", sequence=frame)
+        stream.set_time("time", duration=frame / source.fps)
         for view in range(len(source.sequence.views)):
-            recording.log_pinholes(view)
-        for frame in range(len(source.sequence.tracks_m)):
-            stream.set_time("frame", sequence=frame)
-            stream.set_time("time", duration=frame / source.fps)
-            for view in range(len(source.sequence.views)):
-                recording.log_view(view, frame)
-            recording.log_tracks(frame)
-        stream.flush(blocking=True)
-        stream.disconnect()
+            recording.log_view(view, frame)
+        recording.log_tracks(frame)
+        if source.meshes is not None:
+            recording.log_people(source.meshes, frame)
+    stream.flush(blocking=True)
+    stream.disconnect()
 
 
 @dataclass(frozen=True)
@@ -87,6 +133,31 @@ class _Recording:
         self.stream.log(f"world/view_{index}/image", pinhole, static=True)
         if view.depth_m is not None:
             self.stream.log(f"world/view_{index}/depth", pinhole, static=True)
+
+    def log_still_meshes(self, meshes: KeptMeshes) -> None:
+        """The room, and of the people what does not move: triangles and colours."""
+        for still in still_meshes(self.source, meshes):
+            mesh = self.rr.Mesh3D(
+                vertex_positions=still.vertices_m,
+                triangle_indices=still.faces,
+                vertex_normals=vertex_normals(still.vertices_m.astype(np.float32), still.faces),
+                albedo_factor=still.colour,
+            )
+            self.stream.log(still.path, mesh, static=True)
+        for actor in meshes.actors:
+            surface = self.rr.Mesh3D.from_fields(triangle_indices=actor.faces, vertex_colors=vertex_colours(actor))
+            self.stream.log(self._person_path(actor.object_index), surface, static=True)
+
+    def log_people(self, meshes: KeptMeshes, frame: int) -> None:
+        """Where the vertices of the people are at a frame."""
+        for actor in meshes.actors:
+            vertices_m = np.asarray(actor.vertices_m[frame])
+            normals = vertex_normals(vertices_m, actor.faces)
+            moved = self.rr.Mesh3D.from_fields(vertex_positions=vertices_m, vertex_normals=normals)
+            self.stream.log(self._person_path(actor.object_index), moved)
+
+    def _person_path(self, object_index: int) -> str:
+        return f"world/people/{entity_name(self.source, object_index)}"
 
     def log_view(self, index: int, frame: int) -> None:
         """Pose, image, depth and seen tracks of a view at a frame."""
@@ -117,23 +188,12 @@ class _Recording:
         self.stream.log("world/trails", lines)
 
 
-def _sdk() -> Any:
-    try:
-        return import_module("rerun")
-    except ImportError:
-        raise EnvironmentSetupError(
-            "a Rerun recording needs Rerun's SDK, which is not installed: pip install 'perpetua[rerun]'"
-        ) from None
-
-
 def _tracks_by_object(source: ExportSource) -> dict[str, Int64[np.ndarray, " _"]]:
-    """Tracks of each object under a name that can be part of an entity path."""
-    groups: dict[str, Int64[np.ndarray, " _"]] = {}
-    for index in np.unique(source.track_object).tolist():
-        name = re.sub(r"[^A-Za-z0-9_-]", "_", source.object_name.get(index, f"object_{index}"))
-        unique = name if name not in groups else f"{name}_{index}"
-        groups[unique] = np.flatnonzero(source.track_object == index)
-    return groups
+    """Tracks of each object under the name that its mesh has."""
+    return {
+        entity_name(source, index): np.flatnonzero(source.track_object == index)
+        for index in np.unique(source.track_object).tolist()
+    }
 
 
 def _track_colours(source: ExportSource) -> UInt8[np.ndarray, "P 3"]:

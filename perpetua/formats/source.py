@@ -10,10 +10,12 @@ from typing import Any, Protocol
 import numpy as np
 from jaxtyping import Float32, Float64, Int64, UInt16
 
+from perpetua.actors.types import ActorMesh
 from perpetua.errors import SequenceFormatError
 from perpetua.formats.reader import Sequence, SequenceView
 from perpetua.geometry.transforms import transform_points
 from perpetua.registry import Registry
+from perpetua.rooms.types import Room
 
 PERSON = "person"
 # Corner of the top-left pixel as origin, where ours is its centre: what other readers add to our pixels.
@@ -21,12 +23,21 @@ HALF_PIXEL_PX = 0.5
 
 
 @dataclass(frozen=True)
+class KeptMeshes:
+    """The meshes that a sequence was made of."""
+
+    room: Room
+    actors: tuple[ActorMesh, ...]
+
+
+@dataclass(frozen=True)
 class ExportSource:
-    """A finished sequence; ``object_index`` has one array per view where the work area keeps what was rendered."""
+    """A finished sequence; with the rendered object index, one array per view, and meshes where they are kept."""
 
     name: str
     sequence: Sequence
     object_index: tuple[UInt16[np.ndarray, "F H W"], ...] | None = None
+    meshes: KeptMeshes | None = None
 
     @cached_property
     def record(self) -> dict[str, Any]:

@@ -7,24 +7,25 @@ from perpetua.errors import InputError
 from perpetua.formats.exporters import EXPORTERS
 from perpetua.formats.reader import read_sequence
 from perpetua.formats.source import ExportSource
-from perpetua.pipeline.kept import kept_object_index
+from perpetua.pipeline.kept import kept_meshes, kept_object_index
 
 
 def load_source(sequence_folder: Path) -> ExportSource:
-    """A finished sequence, with the rendered object index where its work area is kept.
+    """A finished sequence, with the rendered object index and the meshes where its work area is kept.
 
     Raises:
         SequenceFormatError: the sequence is damaged.
     """
     name = sequence_folder.resolve().name
-    return ExportSource(name, read_sequence(sequence_folder), kept_object_index(sequence_folder))
+    sequence = read_sequence(sequence_folder)
+    return ExportSource(name, sequence, kept_object_index(sequence_folder), kept_meshes(sequence_folder))
 
 
 def export_sequence(sequence_folder: Path, export_format: str, target: Path) -> list[Path]:
     """Writes a sequence into the folder ``target`` in another layout; returns what it added there.
 
-    The sequence alone is enough. Where its work area is kept, formats that tell objects apart take the rendered
-    object index from it.
+    The sequence alone is enough. Where its work area is kept, formats that tell objects apart or show meshes take
+    these from it.
 
     Raises:
         InputError: something of the same name is in ``target``.

@@ -11,6 +11,7 @@ from perpetua.actors.types import ActorMesh, Route
 from perpetua.audit.deep import DeepScene
 from perpetua.cameras.types import CameraPath
 from perpetua.errors import InputError
+from perpetua.formats.source import KeptMeshes
 from perpetua.pipeline import codec
 from perpetua.pipeline.layout import WORK_FOLDER, RunRecord, read_run
 from perpetua.pipeline.stages import STAGES
@@ -38,17 +39,15 @@ def load_kept_scene(sequence_folder: Path) -> KeptScene:
     Raises:
         InputError: the sequence does not lie in its run's output folder, or its work area was freed.
     """
-    folder = sequence_folder.resolve()
-    out = folder.parent.parent
-    work = out / WORK_FOLDER / folder.name
+    work = _work_folder(sequence_folder)
     if not work.is_dir():
         raise InputError(
-            f"the work area of '{sequence_folder}' is not kept (no {WORK_FOLDER}/{folder.name} in its output folder): "
+            f"the work area of '{sequence_folder}' is not kept (no {WORK_FOLDER}/{work.name} in its output folder): "
             "run the same perpetua generate again with a new --out, and no perpetua clean after it"
         )
     kept = {name: _load(work, name) for name in ("room", "routes", "actors", "cameras", "render")}
     return KeptScene(
-        run=read_run(out),
+        run=read_run(work.parent.parent),
         room_number=_room_number(work),
         room=kept["room"],
         routes=kept["routes"],
@@ -60,12 +59,26 @@ def load_kept_scene(sequence_folder: Path) -> KeptScene:
 
 def kept_object_index(sequence_folder: Path) -> tuple[UInt16[np.ndarray, "T H W"], ...] | None:
     """The rendered object index of each view, or None where the work area does not hold it."""
-    folder = sequence_folder.resolve()
-    work = folder.parent.parent / WORK_FOLDER / folder.name
-    stage = next(stage for stage in STAGES if stage.name == "render")
-    if StageFolder(work, stage.number, stage.name).manifest() is None:
+    work = _work_folder(sequence_folder)
+    return tuple(view.object_index for view in _load(work, "render")) if _holds(work, "render") else None
+
+
+def kept_meshes(sequence_folder: Path) -> KeptMeshes | None:
+    """The meshes of room and people, or None where the work area does not hold them."""
+    work = _work_folder(sequence_folder)
+    if not (_holds(work, "room") and _holds(work, "actors")):
         return None
-    return tuple(view.object_index for view in _load(work, stage.name))
+    return KeptMeshes(_load(work, "room"), _load(work, "actors"))
+
+
+def _work_folder(sequence_folder: Path) -> Path:
+    folder = sequence_folder.resolve()
+    return folder.parent.parent / WORK_FOLDER / folder.name
+
+
+def _holds(work: Path, name: str) -> bool:
+    stage = next(stage for stage in STAGES if stage.name == name)
+    return StageFolder(work, stage.number, stage.name).manifest() is not None
 
 
 def _load(work: Path, name: str) -> Any:
