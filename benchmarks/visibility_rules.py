@@ -30,7 +30,8 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from visibility_sheet import Example, write_sheet
 
-from perpetua.audit.deep import DeepScene, Reach, SceneRays
+from perpetua.audit.deep import Reach, SceneRays
+from perpetua.audit.deep_scene import DeepScene
 from perpetua.audit.files import SequenceFiles, load_files
 from perpetua.audit.geometry import camera_centre_m, project_to_pixels
 from perpetua.audit.verify import find_sequences

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-from jaxtyping import Bool, Float64, Int64, UInt16
+from jaxtyping import Bool, Float64, Int64
 
-from perpetua.actors.types import ActorMesh
 from perpetua.audit.config import AuditConfig
+from perpetua.audit.deep_scene import DeepScene
 from perpetua.audit.files import SequenceFiles
 from perpetua.audit.geometry import camera_centre_m, depth_of_planes, project_to_pixels
+from perpetua.audit.on_meshes import check_on_meshes
 from perpetua.audit.report import Check
-from perpetua.rooms.types import Room
 
 NOTHING = 0
 # Depth bends by more than this share of itself from pixel to pixel only at silhouettes and creases.
@@ -24,15 +24,6 @@ BEND_SHARE = 0.01
 # A ray has reached a point this far before it, metres: single precision's reach in a room.
 REACHED_M = 5e-4
 AROUND = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-
-
-@dataclass(frozen=True)
-class DeepScene:
-    """The meshes that a sequence shows, and, where they are kept, the object indices that were rendered."""
-
-    room: Room
-    actors: tuple[ActorMesh, ...]
-    object_index: tuple[UInt16[np.ndarray, "T H W"], ...] | None
 
 
 @dataclass(frozen=True)
@@ -150,11 +141,14 @@ class _Share:
         return Check(name, passed, share, f">= {least:g} of entries", detail)
 
 
-def verify_deep(files: SequenceFiles, scene: DeepScene, bounds: AuditConfig, frames: int) -> list[Check]:
-    """Casts rays for depth, object and visibility.
+def verify_deep(
+    files: SequenceFiles, table: dict[str, np.ndarray], scene: DeepScene, bounds: AuditConfig, frames: int
+) -> list[Check]:
+    """Casts rays for depth, object and visibility, and looks where the meshes have the tracks.
 
     Args:
         files: the sequence, complete.
+        table: ``object_index``, ``face`` and ``barycentric`` of each track, as recorded.
         scene: the meshes it was made from.
         bounds: shares that must agree, and how closely depth must.
         frames: how many frames are looked at, at even distances.
@@ -162,7 +156,8 @@ def verify_deep(files: SequenceFiles, scene: DeepScene, bounds: AuditConfig, fra
     rays = SceneRays(scene)
     depth, objects, sight = _Share(), _Share(), _Share()
     total = len(files.arrays["tracks_xyz.npy"])
-    for frame in np.unique(np.linspace(0, total - 1, frames).round().astype(int)).tolist():
+    chosen = np.unique(np.linspace(0, total - 1, frames).round().astype(int)).tolist()
+    for frame in chosen:
         for number, view in enumerate(files.views):
             where = f"view {view}, frame {frame}"
             predicted_m, owner = _predict(files, rays, view, frame)
@@ -175,7 +170,7 @@ def verify_deep(files: SequenceFiles, scene: DeepScene, bounds: AuditConfig, fra
                 objects.add(on_actor != files.of_view(int(view), "foreground_mask.npy")[frame], clear, where)
             else:
                 objects.add(owner != scene.object_index[number][frame], clear, where)
-            reached, shown = _evidence(files, rays, view, frame, owner)
+            reached, shown = _evidence(files, table, rays, view, frame, owner)
             visible = np.asarray(files.of_view(int(view), "visibility.npy")[frame])
             # Entries off the image count: calling them visible would be wrong. What no pixel around shows is hidden
             # by the format's rule.
@@ -185,6 +180,7 @@ def verify_deep(files: SequenceFiles, scene: DeepScene, bounds: AuditConfig, fra
         depth.check("depth by rays", bounds.deep_agreement),
         objects.check("objects by rays", bounds.deep_agreement),
         sight.check("visibility by rays", bounds.deep_visibility),
+        check_on_meshes(files, table, scene, bounds, chosen),
     ]
 
 
@@ -224,12 +220,15 @@ def _neighbours(values: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _evidence(
-    files: SequenceFiles, rays: SceneRays, view: str, frame: int, owner: Int64[np.ndarray, "H W"]
+    files: SequenceFiles,
+    table: dict[str, np.ndarray],
+    rays: SceneRays,
+    view: str,
+    frame: int,
+    owner: Int64[np.ndarray, "H W"],
 ) -> tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]:
     """Where the ray from the camera reaches a track on the image, and where rays of the four pixel centres around
     meet its object."""
-    assert files.record is not None
-    table = files.record["tracks"]
     pose = files.of_view(int(view), "extrinsics_w2c.npy")[frame]
     point_m = np.asarray(files.arrays["tracks_xyz.npy"][frame], np.float64)
     seen = project_to_pixels(files.of_view(int(view), "intrinsics.npy"), pose, point_m)
@@ -239,7 +238,7 @@ def _evidence(
         inside &= np.abs(seen[:, 1] - (height - 1) / 2) < height / 2
     chosen = np.flatnonzero(inside)
     eye_m = camera_centre_m(pose)
-    object_index, face = (np.asarray(table[name], np.int64)[chosen] for name in ("object_index", "face"))
+    object_index, face = table["object_index"][chosen], table["face"][chosen]
     reached, shown = np.zeros(len(point_m), bool), np.zeros(len(point_m), bool)
     reached[chosen] = rays.reach(frame, eye_m, point_m[chosen], object_index, face).reached
     corner = np.floor(seen[chosen, :2]).astype(np.int64)[:, None] + AROUND

@@ -84,12 +84,14 @@ def track_table(files: SequenceFiles) -> tuple[dict[str, np.ndarray], str]:
     try:
         found: dict[str, np.ndarray] = {
             "object_index": np.asarray(table["object_index"], np.int64),
+            "face": np.asarray(table["face"], np.int64),
             "barycentric": np.asarray(table["barycentric"], np.float64),
         }
         actors = [thing["object_index"] for thing in files.record["objects"] if "actor" in thing]
     except (KeyError, TypeError, ValueError) as error:
         return {}, f"{RECORD_FILE} has no sound table of tracks and objects: {error!r}"
-    if found["object_index"].shape != (count,) or found["barycentric"].shape != (count, 3):
+    shapes = {"object_index": (count,), "face": (count,), "barycentric": (count, 3)}
+    if any(found[name].shape != shape for name, shape in shapes.items()):
         return {}, f"{RECORD_FILE} must have one entry for each of {count} tracks"
     found["on_actor"] = np.isin(found["object_index"], actors)
     return found, ""

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from perpetua.audit.array_checks import check_cameras, check_finite, check_hashes, check_images
 from perpetua.audit.config import AuditConfig
-from perpetua.audit.deep import DeepScene, verify_deep
+from perpetua.audit.deep import verify_deep
+from perpetua.audit.deep_scene import DeepScene
 from perpetua.audit.files import RECORD_FILE, SequenceFiles, load_files
 from perpetua.audit.report import AuditReport, Check
 from perpetua.audit.track_checks import (
@@ -64,8 +65,11 @@ def verify_sequence(folder: Path, bounds: AuditConfig, scene: DeepScene | None =
         checks.append(check_hashes(files))
     if _complete(files):
         checks += _track_checks(files, bounds, skipped)
-        if scene is not None and files.record is not None:
-            checks += verify_deep(files, scene, bounds, frames)
+        table, reason = track_table(files)
+        if scene is not None and table:
+            checks += verify_deep(files, table, scene, bounds, frames)
+        elif scene is not None:
+            skipped.append(f"rays at the meshes: {reason}")
     else:
         skipped.append("tracks and visibility: files of the layout are missing or damaged")
     return AuditReport(folder, tuple(checks), tuple(skipped))

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import UInt16
 
 from perpetua.actors.types import ActorMesh, Route
-from perpetua.audit.deep import DeepScene
+from perpetua.audit.deep_scene import DeepScene
 from perpetua.cameras.types import CameraPath
 from perpetua.errors import InputError
 from perpetua.formats.source import KeptMeshes

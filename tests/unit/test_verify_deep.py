@@ -1,7 +1,11 @@
 """verify --deep: rays at the meshes find what files alone cannot show."""
 
+import json
+import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,10 +13,12 @@ from synthetic_scene import make_scene
 from synthetic_sequence import write_scene
 
 from perpetua.audit.config import AuditConfig
-from perpetua.audit.deep import DeepScene, verify_deep
-from perpetua.audit.files import load_files
+from perpetua.audit.deep_scene import DeepScene
+from perpetua.audit.verify import verify_sequence
 
 FRAMES = 3
+DEEP = ("depth by rays", "objects by rays", "visibility by rays", "tracks on meshes")
+Fault = Callable[[Path], None]
 
 
 @pytest.fixture(scope="module")
@@ -28,12 +34,14 @@ def sequence(good: Path, tmp_path: Path) -> Path:
     return tmp_path / "sequence"
 
 
-def _deep(folder: Path, with_index: bool = True) -> dict[str, tuple[bool, float, str]]:
+def _deep(folder: Path, with_index: bool = True, swapped: bool = False) -> dict[str, tuple[bool, float, str]]:
     scene = make_scene()
-    index = tuple(view.object_index for view in scene.views) if with_index else None
-    files, _ = load_files(folder)
-    checks = verify_deep(files, DeepScene(scene.room, scene.actors, index), AuditConfig(), FRAMES)
-    return {check.name: (check.passed, check.value, check.detail) for check in checks}
+    index = [view.object_index for view in scene.views]
+    if swapped:
+        index[0], index[1] = index[1], index[0]
+    deep = DeepScene(scene.room, scene.actors, tuple(index) if with_index else None)
+    report = verify_sequence(folder, AuditConfig(), deep, FRAMES)
+    return {check.name: (check.passed, check.value, check.detail) for check in report.checks if check.name in DEEP}
 
 
 def _change(path: Path, entry: tuple[object, ...], value: object) -> None:
@@ -44,11 +52,10 @@ def _change(path: Path, entry: tuple[object, ...], value: object) -> None:
 
 @pytest.mark.parametrize("with_index", [True, False])
 def test_good_data_agrees_with_rays_everywhere(good: Path, with_index: bool) -> None:
-    assert {name: value for name, (_, value, _) in _deep(good, with_index).items()} == {
-        "depth by rays": 1.0,
-        "objects by rays": 1.0,
-        "visibility by rays": 1.0,
-    }
+    found = _deep(good, with_index)
+    assert set(found) == set(DEEP) and all(passed for passed, _, _ in found.values()), found
+    assert [found[name][1] for name in DEEP[:3]] == [1.0, 1.0, 1.0]
+    assert found["tracks on meshes"][1] < 1e-6
 
 
 def test_depth_two_millimetres_off_is_caught(sequence: Path) -> None:
@@ -77,7 +84,107 @@ def test_a_mask_that_shows_other_objects_is_caught(sequence: Path) -> None:
     assert _deep(sequence, with_index=True)["objects by rays"][0], "the rendered index is what is asked first"
 
 
-def test_tracks_one_frame_late_are_caught(sequence: Path) -> None:
-    tracks = np.load(sequence / "tracks_xyz.npy")
-    np.save(sequence / "tracks_xyz.npy", np.roll(tracks, 1, axis=0))
-    assert not _deep(sequence)["visibility by rays"][0]
+def _array(name: str, alter: Callable[[np.ndarray], Any]) -> Fault:
+    """Loads an array, alters it, in place or into what ``alter`` returns, and saves it."""
+
+    def plant(folder: Path) -> None:
+        array = np.load(folder / name)
+        altered = alter(array)
+        np.save(folder / name, array if altered is None else altered)
+
+    return plant
+
+
+def _set(name: str, index: Any, value: Any) -> Fault:
+    return _array(name, lambda array: array.__setitem__(index, value))
+
+
+def _record(name: str, alter: Callable[[list[Any]], Any]) -> Fault:
+    """Alters one column of the record's table of tracks in place."""
+
+    def plant(folder: Path) -> None:
+        record = json.loads((folder / "sequence.json").read_text())
+        alter(record["tracks"][name])
+        (folder / "sequence.json").write_text(json.dumps(record))
+
+    return plant
+
+
+def _scaled_world(folder: Path) -> None:
+    """Everything one percent larger, in all files alike."""
+    for path in (folder / "tracks_xyz.npy", folder / "surface_xyz.npy", *folder.glob("*/depth.npy")):
+        np.save(path, np.load(path) * np.float32(1.01))
+    for path in folder.glob("*/extrinsics_w2c.npy"):
+        pose = np.load(path)
+        pose[:, :3, 3] *= np.float32(1.01)
+        np.save(path, pose)
+
+
+def _actors_exchanged(column: list[int]) -> None:
+    column[:] = [{5: 6, 6: 5}.get(index, index) for index in column]
+
+
+def _hide_a_block(visible: np.ndarray) -> None:
+    visible[2, np.flatnonzero(visible[2])[:5]] = False
+
+
+def _camera_aside(poses: np.ndarray) -> None:
+    poses[:, 0, 3] += 0.01
+
+
+def _closer_by_two_millimetres(depth_m: np.ndarray) -> None:
+    depth_m[depth_m > 0] -= 0.002
+
+
+def _first_corner_last(weights: list[list[float]]) -> None:
+    weights[7] = weights[7][::-1]
+
+
+# The files agree with one another in most of these: only the meshes tell.
+FAULTS: dict[str, tuple[Fault, str, str]] = {
+    "depth two millimetres too near in one view": (
+        _array("2/depth.npy", _closer_by_two_millimetres), "depth by rays", "view 2"),
+    "depth in half precision": (
+        _array("0/depth.npy", lambda a: a.astype("f2").astype("f4")), "depth by rays", "view 0, frame 0"),
+    "depth one frame late": (_array("0/depth.npy", lambda a: np.roll(a, 1, axis=0)), "depth by rays", "view 0"),
+    "a camera one centimetre aside": (_array("1/extrinsics_w2c.npy", _camera_aside), "depth by rays", "view 1"),
+    "a focal length half a percent too long": (
+        _array("1/intrinsics.npy", lambda a: a * np.float32([1.005, 1.005, 1, 1])), "depth by rays", "view 1"),
+    "a block called visible": (
+        _set("0/visibility.npy", (2, slice(None, 40)), True), "visibility by rays", "view 0, frame 2"),
+    "a block called hidden": (_array("0/visibility.npy", _hide_a_block), "visibility by rays", "view 0, frame 2"),
+    "visibility one frame late": (
+        _array("1/visibility.npy", lambda a: np.roll(a, 1, axis=0)), "visibility by rays", "view 1"),
+    "tracks one frame late": (
+        _array("tracks_xyz.npy", lambda a: np.roll(a, 1, axis=0)), "tracks on meshes", r"tracks_xyz.npy\[\d, \d+\]"),
+    "triangles one frame late": (
+        _array("surface_xyz.npy", lambda a: np.roll(a, 1, axis=0)), "tracks on meshes", "surface_xyz.npy"),
+    "the world scaled": (_scaled_world, "tracks on meshes", "m from face"),
+    "one track on another object": (_record("object_index", lambda c: c.__setitem__(7, 3)), "tracks on meshes", ", 7"),
+    "one track on an object that does not exist": (
+        _record("object_index", lambda c: c.__setitem__(7, 99)), "tracks on meshes", "is inf m from face"),
+    "one track on the next face": (
+        _record("face", lambda c: c.__setitem__(7, c[7] + 1)), "tracks on meshes", ", 7"),
+    "two actors exchanged": (_record("object_index", _actors_exchanged), "tracks on meshes", "object [56]"),
+    "one barycentric point turned round": (_record("barycentric", _first_corner_last), "tracks on meshes", ", 7"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_planted_fault_is_caught_by_rays_or_meshes(sequence: Path, name: str) -> None:
+    plant, check, words = FAULTS[name]
+    plant(sequence)
+    passed, value, detail = _deep(sequence)[check]
+    assert not passed and re.search(words, detail), (value, detail)
+
+
+def test_object_indices_of_two_views_exchanged_are_caught(good: Path) -> None:
+    passed, _, detail = _deep(good, swapped=True)["objects by rays"]
+    assert not passed and "view 0, frame 0" in detail
+
+
+def test_without_a_sound_table_of_tracks_no_rays_are_cast(sequence: Path) -> None:
+    _record("face", lambda column: column.pop())(sequence)
+    scene = make_scene()
+    report = verify_sequence(sequence, AuditConfig(), DeepScene(scene.room, scene.actors, None), FRAMES)
+    assert any("rays at the meshes: sequence.json must have one entry" in reason for reason in report.skipped)
