@@ -12,6 +12,7 @@ from pathlib import Path
 from rich.console import Console
 
 from perpetua.cluster.local import raise_on_sigterm, run_rooms
+from perpetua.cluster.outcome import RoomWork
 from perpetua.config import Config
 from perpetua.errors import ConfigError, InputError, PerpetuaError
 from perpetua.files import read_json
@@ -20,6 +21,7 @@ from perpetua.pictures.contact_sheet import write_contact_sheet
 from perpetua.pipeline.cost import Cost, check_disk, estimate_cost, gigabytes
 from perpetua.pipeline.events import OnEvent
 from perpetua.pipeline.layout import LOG_FILE, OutputLayout, open_run
+from perpetua.pipeline.lease import hold
 from perpetua.pipeline.progress import Progress
 from perpetua.pipeline.runner import RoomRun
 from perpetua.pipeline.stages import STAGE_NAMES, STAGES
@@ -62,12 +64,12 @@ def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> i
     if dry_run:
         return 0
     open_run(request.out, request.seed, request.rooms, request.config, request.replace)
-    job = partial(make_room, request, until)
+    work = RoomWork(partial(make_room, request, until), partial(room_folder, request), cost.room_memory_mb)
     logging.getLogger("perpetua").setLevel(logging.INFO)
     raise_on_sigterm()
     try:
         with Progress(request.out / LOG_FILE, len(request.rooms), request.config.cameras.count, console) as progress:
-            failures = run_rooms(request.rooms, request.workers, job, progress.show)
+            failures = run_rooms(request.rooms, request.workers, work, progress.show)
     except KeyboardInterrupt:
         say(f"stopped; what is done is kept. To go on, run the same command again:\n  {_this_command()}")
         return EXIT_INTERRUPTED
@@ -86,13 +88,23 @@ def _exit_code(request: GenerateRequest, failures: dict[int, str]) -> int:
 def make_room(request: GenerateRequest, until: str, room: int, on_event: OnEvent) -> None:
     """One room through the stages, and its contact sheet."""
     RoomRun(request.config, request.seed, room, request.out, request.device, on_event).run(until)
-    if until == STAGES[-1].name:
-        layout = OutputLayout(request.out, request.config.export, request.seed, room)
-        if not layout.contact_sheet.exists():
-            partial_sheet = layout.contact_sheet.with_name(f".{layout.contact_sheet.name}")
-            layout.contact_sheet.parent.mkdir(parents=True, exist_ok=True)
-            write_contact_sheet(read_sequence(layout.sequence_folder), partial_sheet)
-            partial_sheet.replace(layout.contact_sheet)
+    layout = OutputLayout(request.out, request.config.export, request.seed, room)
+    if until == STAGES[-1].name and not layout.contact_sheet.exists():
+        with hold(layout.work_folder):
+            if not layout.contact_sheet.exists():
+                _draw_contact_sheet(layout)
+
+
+def room_folder(request: GenerateRequest, room: int) -> Path:
+    """Where a room's work is done."""
+    return OutputLayout(request.out, request.config.export, request.seed, room).work_folder
+
+
+def _draw_contact_sheet(layout: OutputLayout) -> None:
+    partial_sheet = layout.contact_sheet.with_name(f".{layout.contact_sheet.name}")
+    layout.contact_sheet.parent.mkdir(parents=True, exist_ok=True)
+    write_contact_sheet(read_sequence(layout.sequence_folder), partial_sheet)
+    partial_sheet.replace(layout.contact_sheet)
 
 
 def _checked_stage(until: str | None) -> str:

@@ -11,17 +11,21 @@ from perpetua.errors import InputError
 _JPEG_BYTES_PER_PIXEL = 0.6
 _ACTOR_BYTES_PER_FRAME = 25_000 * 12
 _ROOM_BYTES = 400_000_000
+# The most that one room needed in a worker that had made others before, processes of Blender included, rounded up.
+_INFINIGEN_ROOM_MB = 3500.0
+_OTHER_ROOM_MB = 2200.0
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Counts and disk of a run; sizes in bytes."""
+    """Counts, disk and memory of a run; sizes in bytes, memory in megabytes per room at work."""
 
     rooms: int
     frames: int
     images: int
     sequence_bytes: float
     work_bytes: float
+    room_memory_mb: float
 
     @property
     def total_bytes(self) -> float:
@@ -39,7 +43,8 @@ def estimate_cost(config: Config, rooms: int) -> Cost:
     sequence_bytes = jpeg_bytes + pixels * (4 + 1) + tracks * (12 + 36 + views)
     actor_bytes = 2 * config.actors.count * frames * _ACTOR_BYTES_PER_FRAME
     work_bytes = jpeg_bytes + pixels * (4 + 2 + 8) + actor_bytes + _ROOM_BYTES
-    return Cost(rooms, frames, images, sequence_bytes, work_bytes)
+    room_memory_mb = _INFINIGEN_ROOM_MB if config.rooms.source == "infinigen" else _OTHER_ROOM_MB
+    return Cost(rooms, frames, images, sequence_bytes, work_bytes, room_memory_mb)
 
 
 def check_disk(cost: Cost, out: Path) -> float:

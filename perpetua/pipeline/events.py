@@ -1,7 +1,9 @@
 """What the runner reports while it works; the progress display, the plain log and log.jsonl all read these."""
 
+import json
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Literal
 
 EventKind = Literal[
@@ -31,3 +33,8 @@ class Event:
 
 
 OnEvent = Callable[[Event], None]
+
+
+def log_line(event: Event) -> str:
+    """An event of this moment as a line of a machine-readable log."""
+    return json.dumps({"time": round(time.time(), 3), **asdict(event)}) + "\n"

@@ -1,17 +1,15 @@
 """Where a run keeps what: the one place that knows the names below the output folder."""
 
-import fcntl
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from perpetua.config import Config
-from perpetua.errors import InputError, PerpetuaError
+from perpetua.errors import InputError
 from perpetua.files import write_json
 from perpetua.formats.config import ExportConfig, split_of_room
 from perpetua.formats.layout import AUDIT
+from perpetua.pipeline.lease import hold_when_free
 
 WORK_FOLDER = ".work"
 RUN_FILE = "run.json"
@@ -65,19 +63,6 @@ class OutputLayout:
         """The keys of stages whose draw was rejected, with the reasons, so that no run tries them again."""
         return self.work_folder / "rejected.json"
 
-    @contextmanager
-    def lock(self) -> Iterator[None]:
-        """Keeps two runs on this machine from working on one room at once; the system frees it if we die."""
-        self.work_folder.mkdir(parents=True, exist_ok=True)
-        with (self.work_folder / ".lock").open("w") as handle:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise PerpetuaError(
-                    f"another run is working on room {self.room} in '{self.out}': wait for it, or choose another --out"
-                ) from None
-            yield
-
 
 @dataclass(frozen=True)
 class RunRecord:
@@ -114,6 +99,15 @@ def open_run(out: Path, seed: int, rooms: range, config: Config, replace: bool) 
     Raises:
         InputError: the folder was made with another seed or config and ``replace`` is false, or is not writable.
     """
+    try:
+        # Of two runs that begin at once, neither may forget the other's rooms.
+        with hold_when_free(out / WORK_FOLDER):
+            return _record_rooms(out, seed, rooms, config, replace)
+    except OSError as error:
+        raise InputError(f"cannot write to --out '{out}': {error}") from None
+
+
+def _record_rooms(out: Path, seed: int, rooms: range, config: Config, replace: bool) -> RunRecord:
     wanted = set(rooms)
     if (out / RUN_FILE).exists() and not replace:
         before = read_run(out)
@@ -125,12 +119,7 @@ def open_run(out: Path, seed: int, rooms: range, config: Config, replace: bool) 
             )
         wanted |= set(before.rooms)
     record = RunRecord(seed, tuple(sorted(wanted)), config)
-    try:
-        write_json(
-            out / RUN_FILE, {"seed": seed, "rooms": list(record.rooms), "config": config.model_dump(mode="json")}
-        )
-    except OSError as error:
-        raise InputError(f"cannot write to --out '{out}': {error}") from None
+    write_json(out / RUN_FILE, {"seed": seed, "rooms": list(record.rooms), "config": config.model_dump(mode="json")})
     return record
 
 

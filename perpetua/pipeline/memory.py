@@ -28,14 +28,19 @@ class PeakMemory:
     def _watch(self) -> None:
         root = psutil.Process()
         while True:
-            self.peak_mb = max(self.peak_mb, _tree_memory_mb(root))
+            self.peak_mb = max(self.peak_mb, tree_memory_mb(root))
             if self._done.wait(self._interval_s):
                 return
 
 
-def _tree_memory_mb(root: psutil.Process) -> float:
+def tree_memory_mb(root: psutil.Process) -> float:
+    """Resident memory of a process and all that it started, megabytes; 0 if it has ended."""
+    try:
+        processes = [root, *root.children(recursive=True)]
+    except psutil.Error:
+        return 0.0
     total = 0
-    for process in (root, *root.children(recursive=True)):
+    for process in processes:
         try:
             total += process.memory_info().rss
         except psutil.Error:

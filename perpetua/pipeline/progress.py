@@ -1,9 +1,7 @@
 """What the user sees while rooms are made: a live table on a terminal, plain lines elsewhere, and log.jsonl."""
 
-import json
 import time
 from contextlib import AbstractContextManager
-from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 
@@ -12,7 +10,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from perpetua.pipeline.events import Event
+from perpetua.pipeline.events import Event, log_line
 
 
 class Progress(AbstractContextManager["Progress"]):
@@ -49,7 +47,7 @@ class Progress(AbstractContextManager["Progress"]):
 
     def show(self, event: Event) -> None:
         """Takes one event."""
-        self._log.write(json.dumps({"time": round(time.time(), 3), **asdict(event)}) + "\n")
+        self._log.write(log_line(event))
         self._log.flush()
         if event.kind == "frame_rendered" and not self._estimated and event.seconds > 0:
             self._estimated = True

@@ -14,6 +14,7 @@ from perpetua.formats.layout import AUDIT as AUDIT_FILE
 from perpetua.pipeline import codec, store
 from perpetua.pipeline.events import Event, OnEvent
 from perpetua.pipeline.layout import OutputLayout
+from perpetua.pipeline.lease import Lease, hold
 from perpetua.pipeline.memory import PeakMemory
 from perpetua.pipeline.stages import SEQUENCE_FOLDER, STAGES, Stage, StageContext
 from perpetua.rendering.scripts import scripts_sha256
@@ -37,6 +38,7 @@ class RoomRun:
     rejected: int = 0
     keys: dict[str, str] = field(default_factory=dict)
     values: dict[str, Any] = field(default_factory=dict)
+    lease: Lease = field(init=False)
 
     def __post_init__(self) -> None:
         self.layout = OutputLayout(self.out, self.config.export, self.seed, self.room)
@@ -46,13 +48,19 @@ class RoomRun:
 
         Raises:
             PerpetuaError: a stage failed; what is finished stays.
+            LeaseHeldError: another run is at the room.
         """
         self._report("room_started")
-        if published_redraw(self.layout, self.config, self.stages) is None:
-            with self.layout.lock():
-                self._run_draws(until)
+        if not self._is_published():
+            with hold(self.layout.work_folder) as self.lease:
+                # Another run may have made it since.
+                if not self._is_published():
+                    self._run_draws(until)
         self.layout.failure_file.unlink(missing_ok=True)
         self._report("room_finished")
+
+    def _is_published(self) -> bool:
+        return published_redraw(self.layout, self.config, self.stages) is not None
 
     def _run_draws(self, until: str) -> None:
         """Draws that an earlier run found wanting are not tried again, so the outcome has no history."""
@@ -102,11 +110,13 @@ class RoomRun:
             self._report("stage_skipped", stage.name)
             return
         self._report("stage_started", stage.name)
+        self.lease.require_held()
         started = time.monotonic()
         partial = folder.begin(key, stage.resumable)
         with PeakMemory() as memory:
             codec.save(stage.run(self._context(stage, partial)), partial)
             outputs = store.output_hashes(partial, stage.leftovers)
+        self.lease.require_held()
         seconds = time.monotonic() - started
         folder.finish(
             store.Manifest(
@@ -128,6 +138,7 @@ class RoomRun:
 
     def _context(self, stage: Stage, partial: Path) -> StageContext:
         def on_frame(done: int, total: int, seconds: float) -> None:
+            self.lease.require_held()
             self._report("frame_rendered", stage.name, seconds=seconds, frames_done=done, frames_total=total)
 
         return StageContext(
@@ -151,6 +162,7 @@ class RoomRun:
 
     def _publish(self) -> None:
         """The sequence appears under its final name by rename, so that no reader sees half of one."""
+        self.lease.require_held()
         target = self.layout.sequence_folder
         partial = target.with_name(f".{target.name}.partial")
         shutil.rmtree(partial, ignore_errors=True)

@@ -11,10 +11,8 @@ from typing import Any
 
 import pytest
 
-from perpetua.cluster.local import run_rooms
 from perpetua.config import Config
 from perpetua.errors import AuditError, RouteError
-from perpetua.pipeline.events import Event, OnEvent
 from perpetua.pipeline.layout import OutputLayout
 from perpetua.pipeline.runner import RoomRun, stage_keys
 from perpetua.pipeline.stages import STAGES, Stage, StageContext
@@ -189,19 +187,3 @@ def test_every_setting_that_a_sequence_depends_on_is_in_some_key() -> None:
     longer = stage_keys(Config.model_validate({"sequence": {"frames": 9}}), 0, 0)
     changed = {name for name in base if base[name] != longer[name]}
     assert changed == {stage.name for stage in STAGES} - {"room", "navigation"}
-
-
-def _job(out: Path, room: int, on_event: OnEvent) -> None:
-    if room == 1:
-        raise RouteError("no way through")
-    RoomRun(Config(), 7, room, out, "cpu", on_event, _table(Counter())).run("audit")
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_one_failing_room_does_not_stop_the_others(tmp_path: Path, workers: int) -> None:
-    events: list[Event] = []
-    failures = run_rooms(range(4), workers, partial(_job, tmp_path), events.append)
-    assert failures == {1: "no way through"}
-    assert sorted(path.name[-1] for path in (tmp_path / "train").iterdir()) == ["0", "2", "3"]
-    assert {event.room for event in events if event.kind == "room_finished"} == {0, 2, 3}
-    assert [event.text for event in events if event.kind == "room_failed"] == ["no way through"]
