@@ -37,6 +37,7 @@ for command in (
     check.evaluate,
     look.preview,
     look.view,
+    look.report,
     convert.tracks,
     convert.export,
     machine.assets,

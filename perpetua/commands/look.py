@@ -121,3 +121,19 @@ def view(sequence: Path, out: Path | None) -> None:
 def _has_display() -> bool:
     """Whether a window can be opened; only Linux may have none."""
     return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+@click.command()
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("report.html"), show_default=True,
+              help="HTML file to write.")  # fmt: skip
+def report(folder: Path, out: Path) -> None:
+    """Write a page about a data set: pictures, figures and distributions, checks, cost. One HTML file, no other.
+
+    DIR holds sequences, or is one; they need not be Perpetua's own.
+    """
+    from perpetua.audit.verify import find_sequences
+    from perpetua.report.page import write_report
+
+    write_report(folder, find_sequences(folder), out, click.echo)
+    click.echo(f"wrote {out}")

@@ -1,0 +1,87 @@
+"""What the page says of one sequence, read from its files alone."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from perpetua.errors import SequenceFormatError
+from perpetua.formats import layout
+from perpetua.formats.reader import read_sequence
+from perpetua.pipeline.layout import LOG_FILE
+from perpetua.report.measure import Measured, measure
+from perpetua.report.records import (
+    AuditRecord,
+    CheckRecord,
+    SequenceRecord,
+    StageEvent,
+    garments,
+    height_cm,
+    read_record,
+    read_stages,
+)
+from perpetua.report.thumbnails import thumbnails
+
+USUAL_FPS = 24.0
+
+
+@dataclass(frozen=True)
+class SequenceFigures:
+    """A sequence on the page. ``lacks`` says what could not be known, and why.
+
+    ``measured`` is None where the files cannot be read; ``pictures`` are data URIs, one per view, or none.
+    """
+
+    folder: Path
+    lacks: tuple[str, ...]
+    record: SequenceRecord
+    checks: tuple[CheckRecord, ...]
+    stages: dict[str, StageEvent]
+    measured: Measured | None = None
+    pictures: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The sequence's folder."""
+        return self.folder.resolve().name
+
+    @property
+    def heights_cm(self) -> list[float]:
+        """Of the people whose description says it."""
+        return [height for words in self.record.people if (height := height_cm(words)) is not None]
+
+    @property
+    def garments(self) -> list[str]:
+        """Of all people."""
+        return [garment for words in self.record.people for garment in garments(words)]
+
+    @property
+    def passed(self) -> int:
+        """How many checks passed."""
+        return sum(check.passed for check in self.checks)
+
+    @property
+    def seconds(self) -> float | None:
+        """What the sequence cost, all stages together."""
+        return sum(event.seconds for event in self.stages.values()) if self.stages else None
+
+
+def gather(folder: Path, pictured: bool) -> SequenceFigures:
+    """Reads a sequence, with pictures of it if wanted; what is missing or damaged is said in the result, not raised."""
+    record, audit = read_record(folder / layout.RECORD, SequenceRecord), read_record(folder / layout.AUDIT, AuditRecord)
+    lacks = [said for said in (record, audit) if isinstance(said, str)]
+    known = SequenceRecord() if isinstance(record, str) else record
+    checks = () if isinstance(audit, str) else audit.checks
+    stages = {} if known.room is None else read_stages(folder.resolve().parent.parent / LOG_FILE, known.room)
+    if known.room is not None and not stages:
+        lacks.append(f"what it cost is unknown: no {LOG_FILE} two folders up tells of it")
+    if known.fps is None:
+        lacks.append(f"no frames per second are recorded: {USUAL_FPS:g} are taken for speeds")
+    try:
+        sequence = read_sequence(folder)
+        measured = measure(sequence, known.fps or USUAL_FPS)
+        pictures = thumbnails(sequence) if pictured else ()
+    except (SequenceFormatError, OSError) as error:
+        return SequenceFigures(folder, (*lacks, f"cannot be read: {error}"), known, checks, stages)
+    flat = [str(number) for number, view in enumerate(sequence.views) if view.depth_m is None]
+    if flat:
+        lacks.append(f"there is no {layout.DEPTH} in view {', '.join(flat)}")
+    return SequenceFigures(folder, tuple(lacks), known, checks, stages, measured, pictures)

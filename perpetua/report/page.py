@@ -1,0 +1,87 @@
+"""``perpetua report DIR``: one HTML file about a data set that needs no other file and no network."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+import perpetua
+from perpetua.errors import InputError
+from perpetua.report.dataset import charts, check_rows, compare, stage_rows
+from perpetua.report.gather import gather
+
+TEMPLATE = "page.html.j2"
+# More of them would make a page that a browser opens slowly.
+MOST_PICTURED = 200
+
+
+def write_report(root: Path, folders: list[Path], page: Path, say: Callable[[str], None]) -> None:
+    """Writes the page of some sequences.
+
+    Args:
+        root: the data set's folder, for the title.
+        folders: its sequences.
+        page: HTML file to write.
+        say: takes a line for the user, one per sequence that cannot be read.
+
+    Raises:
+        InputError: the page cannot be written.
+    """
+    figures = [gather(folder, pictured=number < MOST_PICTURED) for number, folder in enumerate(folders)]
+    for one in figures:
+        if one.measured is None:
+            say(f"{one.folder}: {one.lacks[-1]}")
+    text = _environment().get_template(TEMPLATE).render(
+        title=root.resolve().name,
+        version=perpetua.__version__,
+        sequences=figures,
+        readable=sum(one.measured is not None for one in figures),
+        comparison=compare(figures),
+        charts=charts(figures),
+        checks=check_rows(figures),
+        stages=stage_rows(figures),
+        most_pictured=MOST_PICTURED,
+    )  # fmt: skip
+    try:
+        partial = page.with_name(f".{page.name}.partial")
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(page)
+    except OSError as error:
+        raise InputError(f"cannot write --out '{page}': {error}") from None
+
+
+def _environment() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"figure": _figure, "duration": _duration, "known": _known}
+    return environment
+
+
+def _known(value: float) -> float | None:
+    """None for what is not a number."""
+    return value if math.isfinite(value) else None
+
+
+def _figure(value: float | None) -> str:
+    """A number as short as it can be read."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0.0 or 1e-2 <= abs(value) < 1e5:
+        return f"{value:,.3f}".rstrip("0").rstrip(".")
+    return f"{value:.1e}"
+
+
+def _duration(seconds: float | None) -> str:
+    """Seconds as a person says them."""
+    if seconds is None:
+        return "–"
+    if seconds < 100.0:
+        return f"{seconds:.1f} s"
+    minutes = seconds / 60.0
+    return f"{minutes:.1f} min" if minutes < 100.0 else f"{minutes / 60.0:.1f} h"
