@@ -1,4 +1,4 @@
-"""Rules that decide from rendered images whether a point is seen, scored against exact rays at the meshes.
+"""Rendered depth and object index, and rules that decide from them whether a point is seen, against exact rays.
 
     perpetua generate --preset quick --seed 7 --rooms 2 --out made
     python benchmarks/visibility_rules.py made/*/* --frames 8 --sheet rules.png
@@ -17,7 +17,9 @@ depths in double precision; ``perpetua.audit.deep``, which shares no code with w
 Points that a ray reaches and that no pixel around shows the object of (in no pixel) are hidden by the rule that a point
 is visible only where the image agrees; they get fewer as images get larger.
 
-The work area of the sequences must still be there. The sheet shows examples of what each rule still gets wrong.
+Depth is compared at pixel centres off silhouettes, where the eight neighbours show the same object and depth does not
+bend, object index there and everywhere. The work area of the sequences must still be there. The sheet shows examples of
+what each rule still gets wrong.
 """
 
 import argparse
@@ -28,6 +30,7 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
+from pixel_agreement import HEADINGS, PixelCount, count_pixels
 from visibility_sheet import Example, write_sheet
 
 from perpetua.audit.deep import Reach, SceneRays
@@ -44,6 +47,7 @@ CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 BACKGROUND_M = 1e10
 COINCIDENT_M = 0.01
 GRAZING_COSINE = float(np.cos(np.radians(80.0)))
+COUNTED = ("entries", "on image", "wrongly visible", "wrongly hidden", "of these in no pixel")
 GROUPS = ("all", "static", "moving")
 
 
@@ -110,9 +114,11 @@ class Subject:
 
 
 class Ledger:
-    """Counts by rule and group of tracks, disagreements by kind (on the image), and some examples of each kind."""
+    """Counts of pixels; of entries by rule and group of tracks; disagreements by kind (on the image), and some examples
+    of each kind."""
 
     def __init__(self, examples: int) -> None:
+        self.pixels = PixelCount()
         self.counts: Counter[tuple[str, str, str]] = Counter()
         self.kinds: Counter[tuple[str, str]] = Counter()
         self.examples: dict[tuple[str, str], list[Example]] = {}
@@ -130,6 +136,23 @@ class Ledger:
         if len(kept) < self.wanted and all(example.image != other.image for other in kept):
             kept.append(example)
 
+    def add(self, other: "Ledger") -> None:
+        """Takes in what another ledger counted."""
+        self.pixels = self.pixels + other.pixels
+        self.counts.update(other.counts)
+        self.kinds.update(other.kinds)
+        for key, examples in other.examples.items():
+            kept = self.examples.setdefault(key, [])
+            kept += examples[: max(self.wanted - len(kept), 0)]
+
+    def agreement(self, rule: str, group: str = "all") -> list[str]:
+        """Entries and those on the image, agreement of a rule over both, and what is wrong."""
+        counts = {name: self.counts[rule, group, name] for name in COUNTED}
+        wrong = counts["wrongly visible"] + counts["wrongly hidden"]
+        shares = [f"{100 * (1.0 - wrong / max(counts[name], 1)):.3f}%" for name in COUNTED[:2]]
+        numbers = [str(count) for count in counts.values()]
+        return [*numbers[:2], *shares, *numbers[2:]]
+
     def in_order(self) -> list[tuple[str, str]]:
         """Rules and kinds that occurred, rule by rule."""
         return sorted(self.kinds, key=lambda key: (list(RULES).index(key[0]), key[1]))
@@ -141,6 +164,8 @@ def score(subject: Subject, frames: int, ledger: Ledger) -> None:
     total = len(subject.files.arrays["tracks_xyz.npy"])
     for frame in np.unique(np.linspace(0, total - 1, min(frames, total)).round().astype(int)).tolist():
         for view in range(len(subject.files.views)):
+            assert subject.scene.object_index is not None
+            ledger.pixels += count_pixels(subject.files, rays, subject.scene.object_index, view, frame)
             _score_image(subject, rays, view, frame, ledger)
 
 
@@ -188,9 +213,9 @@ def _enter(
             "on image": members & on_image,
             "wrongly visible": members & found & ~true,
             "wrongly hidden": members & ~found & true,
-            "unshown": members & ~found & true & ~shown,
+            "of these in no pixel": members & ~found & true & ~shown,
         }
-        ledger.enter(rule, group, {name: int(entries.sum()) for name, entries in of_group.items()})
+        ledger.enter(rule, group, {name: int(of_group[name].sum()) for name in COUNTED})
 
 
 def _shot(
@@ -237,6 +262,7 @@ def _kinds(
     size = np.linalg.norm(normal, axis=1) * np.linalg.norm(towards_m, axis=1)
     grazing = np.abs((normal * towards_m).sum(axis=1)) < GRAZING_COSINE * size
     shown = [(shot.around_object[wrong] == index[:, None]).any(axis=1) for index in (own, theirs)]
+    # Of the rules compared, the stored one alone hides other points; it found other parts of the object in the pixels.
     of_hidden = {"hair": own_hair, "grazing": grazing, "no pixel around shows its object": ~shown[0]}
     of_visible = {
         "hair": own_hair | their_hair,
@@ -251,21 +277,34 @@ def _kinds(
     return names
 
 
-def _print_tables(ledger: Ledger) -> None:
-    headings = ("rule", "tracks", "entries", "on image", "agreement", "on image", "wrongly visible", "wrongly hidden")
-    print(f"| {' | '.join(headings)} | of these in no pixel |\n|{' --- |' * (len(headings) + 1)}")
+def _print_row(*cells: str) -> None:
+    print(f"| {' | '.join(cells)} |")
+
+
+def _print_heading(*cells: str) -> None:
+    _print_row(*cells)
+    _print_row(*(["---"] * len(cells)))
+
+
+def _print_sequences(ledgers: dict[str, Ledger]) -> None:
+    """Pixels and the stored visibility, sequence by sequence."""
+    _print_heading("sequence", *HEADINGS, "entries", "visibility", "wrongly visible", "wrongly hidden")
+    for name, ledger in ledgers.items():
+        entries, _, agreement, _, visible, hidden, _ = ledger.agreement("stored")
+        _print_row(name, *ledger.pixels.cells(), entries, agreement, visible, hidden)
+
+
+def _print_rules(ledger: Ledger) -> None:
+    """Rules by groups of tracks, and kinds of disagreement."""
+    print()
+    _print_heading("rule", "tracks", *COUNTED[:2], "agreement", "agreement on image", *COUNTED[2:])
     for rule in RULES:
         for group in GROUPS:
-            entries, inside, visible, hidden, unshown = (
-                ledger.counts[rule, group, name]
-                for name in ("entries", "on image", "wrongly visible", "wrongly hidden", "unshown")
-            )
-            shares = (1.0 - (visible + hidden) / max(count, 1) for count in (entries, inside))
-            agreement = " | ".join(f"{100 * share:.3f}%" for share in shares)
-            print(f"| {rule} | {group} | {entries} | {inside} | {agreement} | {visible} | {hidden} | {unshown} |")
-    print("\n| rule | kind of disagreement | entries |\n| --- | --- | --- |")
+            _print_row(rule, group, *ledger.agreement(rule, group))
+    print()
+    _print_heading("rule", "kind of disagreement", "entries")
     for rule, kind in ledger.in_order():
-        print(f"| {rule} | {kind} | {ledger.kinds[rule, kind]} |")
+        _print_row(rule, kind, str(ledger.kinds[rule, kind]))
 
 
 def main() -> None:
@@ -276,10 +315,16 @@ def main() -> None:
     parser.add_argument("--examples", type=int, default=5, help="pictures of each kind of disagreement")
     parser.add_argument("--sheet", type=Path, help="PNG of examples")
     arguments = parser.parse_args()
+    ledgers: dict[str, Ledger] = {}
     ledger = Ledger(arguments.examples)
     for folder in (folder for given in arguments.folders for folder in find_sequences(given)):
-        score(Subject.load(folder), arguments.frames, ledger)
-    _print_tables(ledger)
+        subject = Subject.load(folder)
+        kind = str((subject.files.record or {}).get("room_kind"))
+        own = ledgers.setdefault(f"{folder.name} ({kind})", Ledger(arguments.examples))
+        score(subject, arguments.frames, own)
+        ledger.add(own)
+    _print_sequences({**ledgers, "all": ledger})
+    _print_rules(ledger)
     if arguments.sheet is not None:
         rows = {f"{r} ({ledger.kinds[r, kind]})\n{kind}": ledger.examples[r, kind] for r, kind in ledger.in_order()}
         write_sheet(rows, arguments.sheet)

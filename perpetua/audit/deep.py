@@ -21,8 +21,8 @@ from perpetua.audit.report import Check
 NOTHING = 0
 # Depth bends by more than this share of itself from pixel to pixel only at silhouettes and creases.
 BEND_SHARE = 0.01
-# A ray has reached a point this far before it, metres: single precision's reach in a room.
-REACHED_M = 5e-4
+# A ray has reached a point this far before it, metres: single precision may pick the next triangle at an edge.
+REACHED_M = 1e-4
 AROUND = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 
 
@@ -160,8 +160,8 @@ def verify_deep(
     for frame in chosen:
         for number, view in enumerate(files.views):
             where = f"view {view}, frame {frame}"
-            predicted_m, owner = _predict(files, rays, view, frame)
-            clear = _off_silhouettes(predicted_m, owner)
+            predicted_m, owner = predict_image(files, rays, view, frame)
+            clear = off_silhouettes(predicted_m, owner)
             rendered_m = np.asarray(files.of_view(int(view), "depth.npy")[frame], np.float64)
             allowed_m = bounds.deep_depth_m + bounds.deep_depth_share * predicted_m
             depth.add(np.abs(rendered_m - predicted_m) > allowed_m, clear, where)
@@ -184,7 +184,7 @@ def verify_deep(
     ]
 
 
-def _predict(
+def predict_image(
     files: SequenceFiles, rays: SceneRays, view: str, frame: int
 ) -> tuple[Float64[np.ndarray, "H W"], Int64[np.ndarray, "H W"]]:
     """Depth (0: nothing) and object at each pixel centre."""
@@ -199,7 +199,7 @@ def _predict(
     return depth_m.reshape(height, width), met.object_index.reshape(height, width)
 
 
-def _off_silhouettes(depth_m: Float64[np.ndarray, "H W"], owner: Int64[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
+def off_silhouettes(depth_m: Float64[np.ndarray, "H W"], owner: Int64[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
     """Pixels all of whose neighbours show the same object on a surface that does not bend."""
     clear = np.zeros(owner.shape, bool)
     same = np.ones((owner.shape[0] - 2, owner.shape[1] - 2), bool)

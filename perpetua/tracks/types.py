@@ -36,7 +36,8 @@ class SightReport:
     hair; by something less than 1 cm before the point (or the point is on the back of a closed surface); at a grazing
     angle; by a thing so thin that no pixel around shows it; by an edge. ``unseen_*``: the ray reaches the point, and
     no pixel around shows its surface: hair; a grazing angle; nothing of its object in any pixel around (thin things);
-    otherwise, which is a rendered surface that is not where the mesh is.
+    only other parts of its object, just where the meshes have them (edges, and thin parts such as a rim); otherwise,
+    which is a rendered surface that is not where the mesh is.
     """
 
     entries: int = 0
@@ -50,6 +51,7 @@ class SightReport:
     unseen_hair: int = 0
     unseen_grazing: int = 0
     unseen_thin: int = 0
+    unseen_edge: int = 0
     unseen_otherwise: int = 0
 
     def __add__(self, other: "SightReport") -> "SightReport":

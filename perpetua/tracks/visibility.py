@@ -30,8 +30,9 @@ from perpetua.tracks.sight import HairFaces, SceneSight, SightHits
 from perpetua.tracks.surface import BoundPoints
 from perpetua.tracks.types import SightReport
 
-# A ray has reached its point this far before it: what single precision leaves open.
-REACHED_M, REACHED_SHARE = 2e-4, 2e-5
+# A ray has reached its point this far before it. Which triangle it meets is known to single precision, how far that is
+# to double, so no more is needed than where two triangles meet at an edge.
+REACHED_M, REACHED_SHARE = 5e-5, 5e-6
 # Rendered depth is what the meshes have along the ray when it is within this.
 SAME_DEPTH_M, SAME_DEPTH_SHARE = 1e-3, 1e-4
 # What hides a point from closer than this lies on it: a shirt on skin, a rug on the floor.
@@ -126,11 +127,13 @@ def visible_in_frame(
     agrees = (shows & _on_plane(points.planes, height_m, around, seen, config)).any(axis=1)
     unsure = np.flatnonzero(reached & ~agrees & shows.any(axis=1))
     reach_m = NEIGHBOUR_PX * length_m / seen.intrinsics.fx_px / np.maximum(cosine, GRAZING_COSINE)
-    agrees[unsure] = _on_neighbours(points.point_m, reach_m, unsure, shows, around, seen, sight)
+    as_meshed = np.zeros(len(inside), bool)
+    agrees[unsure], as_meshed[unsure] = _on_neighbours(points.point_m, reach_m, unsure, shows, around, seen, sight)
     visible = np.zeros(len(placed.point_m), bool)
     visible[inside] = reached & agrees
     strands = hair.has(points.object_index, points.face) | (~reached & hair.has(hits.object_index, hits.face))
-    return visible, _count(len(visible), reached, agrees, turned, strands, cosine, length_m, hits, shows, around)
+    counted = _count(len(visible), reached, agrees, turned, strands, cosine, length_m, hits, shows, as_meshed, around)
+    return visible, counted
 
 
 @dataclass(frozen=True)
@@ -182,8 +185,9 @@ def _on_neighbours(
     around: _Around,
     seen: ViewFrame,
     sight: SceneSight,
-) -> Bool[np.ndarray, " M"]:
-    """Whether a pixel around that shows the point's object was rendered just where its ray meets triangles near by."""
+) -> tuple[Bool[np.ndarray, " M"], Bool[np.ndarray, " M"]]:
+    """Whether a pixel around that shows the point's object was rendered just where its ray meets triangles near by;
+    and whether all that show it were rendered just where their rays meet it, near by or not."""
     member, corner = np.nonzero(shows[chosen])
     ray = around.rays(seen.intrinsics)[chosen[member], corner]
     direction = ray @ seen.camera_from_world[:3, :3]
@@ -192,11 +196,13 @@ def _on_neighbours(
     rendered_m = around.depth_m[chosen[member], corner]
     same = np.abs(meshed_m - rendered_m) <= SAME_DEPTH_M + SAME_DEPTH_SHARE * rendered_m
     same &= hits.object_index == around.shown[chosen[member], corner]
+    as_meshed = np.ones(len(chosen), bool)
+    np.logical_and.at(as_meshed, member, same)
     hit_m = seen.centre_m + direction * np.where(np.isfinite(meshed_m), meshed_m, 0.0)[:, None]
     same &= np.linalg.norm(hit_m - point_m[chosen[member]], axis=1) <= reach_m[chosen[member]]
     confirmed = np.zeros(len(chosen), bool)
     np.logical_or.at(confirmed, member, same)
-    return confirmed
+    return confirmed, as_meshed
 
 
 def _count(
@@ -209,6 +215,7 @@ def _count(
     length_m: Float64[np.ndarray, " N"],
     hits: SightHits,
     shows: Bool[np.ndarray, "N 4"],
+    as_meshed: Bool[np.ndarray, " N"],
     around: _Around,
 ) -> SightReport:
     """Counts entries by what the witnesses said and, where they differ, by the first reason that applies."""
@@ -217,7 +224,7 @@ def _count(
     grazing = cosine < GRAZING_COSINE
     blocker_shown = (around.valid & (around.shown == hits.object_index[:, None])).any(axis=1)
     of_blocked = _first_reason(blocked, strands, near | turned, grazing, ~blocker_shown)
-    of_unseen = _first_reason(unseen, strands, grazing, ~shows.any(axis=1))
+    of_unseen = _first_reason(unseen, strands, grazing, ~shows.any(axis=1), as_meshed)
     return SightReport(
         entries=entries,
         inside=len(reached),
@@ -230,7 +237,8 @@ def _count(
         unseen_hair=of_unseen[0],
         unseen_grazing=of_unseen[1],
         unseen_thin=of_unseen[2],
-        unseen_otherwise=of_unseen[3],
+        unseen_edge=of_unseen[3],
+        unseen_otherwise=of_unseen[4],
     )
 
 

@@ -1,5 +1,7 @@
 """Which points are visible: cases with a known answer, and an exact ray cast over a whole scene."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import trimesh
@@ -218,6 +220,25 @@ def test_hidden_entries_are_counted_by_reason() -> None:
     moved = ViewFrame(0, np.eye(4), CAMERA, seen.depth_m - np.float32(0.05), seen.object_index)
     _, other = visible_in_frame(placed(points, corners), moved, ClearSight(), HairFaces({}), CONFIG)
     assert other.unseen_otherwise == len(points)
+
+
+def test_a_rim_between_pixels_is_counted_as_an_edge() -> None:
+    """A wall at 3 m with a ridge of its own 40 cm before it, narrower than a pixel: all pixels show the wall."""
+    _, _, seen = slanted_wall(0.0)
+    size_m = 2.6 / CAMERA.fx_px
+    ridge_m = np.array([[0.9, -9.0, 2.6], [1.1, -9.0, 2.6], [1.0, 9.0, 2.6]]) * [size_m, 1.0, 1.0]
+    wall_m = np.array([[-9.0, -9, 3], [9, -9, 3], [0, 18, 3]])
+    mesh = TriMesh(np.concatenate([wall_m, ridge_m]), np.array([[0, 1, 2], [3, 4, 5]], np.int32))
+    sight = SceneSight(SceneMeshes({7: mesh}, {}, {}))
+    weight = np.random.default_rng(2).dirichlet(np.ones(3), 50)
+    weight[:, 2] = 0.5
+    weight[:, :2] *= 0.5 / weight[:, :2].sum(axis=1, keepdims=True)
+    on_ridge = placed(weight @ ridge_m, np.repeat(ridge_m[None], 50, axis=0))
+    on_ridge = dataclasses.replace(on_ridge, face=np.ones(50, np.int32))
+    shown, report = visible_in_frame(on_ridge, seen, sight, HairFaces({}), CONFIG)
+    assert not shown.any() and report.unseen_edge == 50, report
+    bent = ViewFrame(0, np.eye(4), CAMERA, seen.depth_m + np.float32(0.5), seen.object_index)
+    assert visible_in_frame(on_ridge, bent, sight, HairFaces({}), CONFIG)[1].unseen_otherwise == 50
 
 
 def test_projection_uses_the_exported_values() -> None:
