@@ -149,7 +149,7 @@ FAULTS: dict[str, tuple[Fault, str, str]] = {
     "depth one frame late": (_array("0/depth.npy", lambda a: np.roll(a, 1, axis=0)), "depth by rays", "view 0"),
     "a camera one centimetre aside": (_array("1/extrinsics_w2c.npy", _camera_aside), "depth by rays", "view 1"),
     "a focal length half a percent too long": (
-        _array("1/intrinsics.npy", lambda a: a * np.float32([1.005, 1.005, 1, 1])), "depth by rays", "view 1"),
+        _array("1/intrinsics.npy", lambda a: a * np.array([1.005, 1.005, 1, 1], "f4")), "depth by rays", "view 1"),
     "a block called visible": (
         _set("0/visibility.npy", (2, slice(None, 40)), True), "visibility by rays", "view 0, frame 2"),
     "a block called hidden": (_array("0/visibility.npy", _hide_a_block), "visibility by rays", "view 0, frame 2"),
