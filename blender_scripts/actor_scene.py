@@ -5,7 +5,15 @@ import bpy
 import numpy as np
 from cheap_materials import build_material
 from job_arrays import JobArrays
-from mesh_arrays import add_image_uv, add_object, add_pattern_uv, build_mesh, set_vertices, shade_smooth
+from mesh_arrays import (
+    add_image_uv,
+    add_object,
+    add_pattern_uv,
+    build_mesh,
+    set_velocity,
+    set_vertices,
+    shade_smooth,
+)
 
 
 class Actor:
@@ -28,9 +36,13 @@ class Actor:
             )
         add_object(settings["name"], self._mesh, settings["object_index"])
 
-    def pose(self, frame: int) -> None:
-        """Moves the actor to a frame (0-based)."""
+    def pose(self, frame: int, moving: bool = False) -> None:
+        """Moves the actor to a frame (0-based); ``moving``: tells Cycles how each vertex moves, for motion blur."""
         set_vertices(self._mesh, self._vertices_m[frame])
+        if moving:
+            before, after = max(frame - 1, 0), min(frame + 1, len(self._vertices_m) - 1)
+            moved_m = (self._vertices_m[after] - self._vertices_m[before]) / max(after - before, 1)
+            set_velocity(self._mesh, moved_m)
 
 
 def add_actors(actors: list[dict], arrays: JobArrays) -> list[Actor]:
@@ -38,8 +50,8 @@ def add_actors(actors: list[dict], arrays: JobArrays) -> list[Actor]:
     return [Actor(settings, arrays) for settings in actors]
 
 
-def pose_all(actors: list[Actor], frame: int) -> None:
+def pose_all(actors: list[Actor], frame: int, moving: bool = False) -> None:
     """Moves every actor to a frame and brings the scene up to date."""
     for actor in actors:
-        actor.pose(frame)
+        actor.pose(frame, moving)
     bpy.context.view_layer.update()

@@ -84,12 +84,13 @@ def store(path: Path, development: Development) -> None:
 class TestRender:
     """Renders small linear pictures; restores the scene's settings afterwards."""
 
-    def __init__(self, scratch: Path) -> None:
+    def __init__(self, scene: bpy.types.Scene, scratch: Path) -> None:
+        self._scene = scene
         self._path = scratch / "metering.exr"
 
     def pixels(self) -> np.ndarray:
         """Linear RGB f32[N, 3] of the scene's camera at low resolution."""
-        scene = bpy.context.scene
+        scene = self._scene
         render, image = scene.render, scene.render.image_settings
         kept = (render.resolution_percentage, scene.cycles.samples, render.use_compositing, image.file_format)
         longer_px = max(render.resolution_x, render.resolution_y)
@@ -98,8 +99,8 @@ class TestRender:
         render.use_compositing = False
         image.file_format = "OPEN_EXR"
         try:
-            bpy.ops.render.render(write_still=False)
-            bpy.data.images["Render Result"].save_render(str(self._path))
+            bpy.ops.render.render(write_still=False, scene=scene.name)
+            bpy.data.images["Render Result"].save_render(str(self._path), scene=scene)
         finally:
             render.resolution_percentage, scene.cycles.samples, render.use_compositing, image.file_format = kept
         return self._read()

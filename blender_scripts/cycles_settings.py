@@ -2,62 +2,65 @@
 """Cycles' settings and its device."""
 
 import bpy
+from gpu_choice import enable_gpus
 
-# From fast to slow; the first that has a device is taken.
-GPU_BACKENDS = ("OPTIX", "CUDA", "HIP", "METAL", "ONEAPI")
-# Above this radiance a sample is cut: one lucky path to a lamp must not leave a white dot.
+# Above this radiance a sample is cut: one lucky path to a lamp must not leave a white dot. 0: never.
 CLAMP_DIRECT = 0.0
-CLAMP_INDIRECT = 4.0
 
 
-def choose_device(wanted: str) -> tuple[str, str, str | None]:
-    """Points Cycles at a device: its backend's name, what it is, and a warning where the wish was not met."""
+def choose_device(wanted: str, worker: int, workers: int) -> tuple[str, str, str | None]:
+    """What Cycles shall render on: a backend's name, what it is, and a warning where the wish was not met."""
     if wanted == "cpu":
-        return _use_cpu(None)
-    backends = GPU_BACKENDS if wanted == "auto" else (wanted.upper(),)
-    for backend in backends:
-        names = _enable_gpu(backend)
-        if names:
-            bpy.context.scene.cycles.device = "GPU"
-            return backend.lower(), ", ".join(names), None
-    if wanted == "auto":
-        return _use_cpu("no GPU that Cycles can use was found: rendering on the CPU")
-    return _use_cpu(f"no {wanted} device that Cycles can use was found: rendering on the CPU")
+        return "cpu", _threads(), None
+    enabled = enable_gpus(bpy.context.preferences.addons["cycles"].preferences, wanted, worker, workers)
+    if enabled is not None:
+        backend, names = enabled
+        return backend, ", ".join(names), None
+    kind = "GPU" if wanted == "auto" else f"{wanted} device"
+    return "cpu", _threads(), f"no {kind} that Cycles can use was found: rendering on the CPU"
 
 
-def _use_cpu(warning: str | None) -> tuple[str, str, str | None]:
-    bpy.context.scene.cycles.device = "CPU"
-    return "cpu", f"{bpy.context.scene.render.threads} threads", warning
+def _threads() -> str:
+    return f"{bpy.context.scene.render.threads} threads"
 
 
-def _enable_gpu(backend: str) -> list[str]:
-    """Enables all devices of a backend; none where this build or machine has none."""
-    preferences = bpy.context.preferences.addons["cycles"].preferences
-    try:
-        preferences.compute_device_type = backend
-    except TypeError:
-        return []
-    preferences.refresh_devices()
-    for device in preferences.devices:
-        device.use = device.type == backend
-    return [device.name for device in preferences.devices if device.use]
-
-
-def configure(settings: dict, threads: int) -> None:
-    """Sampling, denoising and speed. Nothing here may blur the ground truth: no motion blur, no depth of field."""
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.render.use_persistent_data = True
-    scene.render.use_motion_blur = False
-    scene.render.film_transparent = False
-    scene.render.resolution_percentage = 100
-    scene.render.use_border = scene.render.use_multiview = scene.render.use_sequencer = False
-    scene.render.use_simplify = False
+def set_threads(scene: bpy.types.Scene, threads: int) -> None:
+    """Threads on the CPU; 0: all."""
     scene.render.threads_mode = "FIXED" if threads else "AUTO"
     if threads:
         scene.render.threads = threads
+
+
+def configure(scene: bpy.types.Scene, backend: str, settings: dict) -> None:
+    """Cycles with the job's sampling and denoising, and without motion blur and depth of field."""
+    render = scene.render
+    render.engine = "CYCLES"
+    scene.cycles.device = "CPU" if backend == "cpu" else "GPU"
+    render.use_persistent_data = True
+    render.use_motion_blur = False
+    render.film_transparent = False
+    render.resolution_percentage = 100
+    render.use_border = render.use_multiview = render.use_sequencer = False
+    render.use_simplify = False
     _configure_sampling(scene.cycles, settings)
-    _configure_denoiser(scene.cycles, settings["denoise"])
+    _configure_denoiser(scene.cycles, settings)
+
+
+def blur_motion(scene: bpy.types.Scene, shutter: float) -> None:
+    """Exposes for a share of a frame's time, around the frame."""
+    scene.render.use_motion_blur = True
+    scene.render.motion_blur_shutter = shutter
+    scene.render.motion_blur_position = "CENTER"
+    scene.cycles.rolling_shutter_type = "NONE"
+
+
+def configure_truth(scene: bpy.types.Scene, backend: str, settings: dict) -> None:
+    """Cycles for depth and object index alone: both come from the first sample, at the centre of the pixel."""
+    configure(scene, backend, settings)
+    scene.cycles.samples = 1
+    scene.cycles.use_adaptive_sampling = False
+    scene.cycles.use_denoising = False
+    scene.cycles.max_bounces = 0
 
 
 def _configure_sampling(cycles: bpy.types.bpy_struct, settings: dict) -> None:
@@ -69,8 +72,7 @@ def _configure_sampling(cycles: bpy.types.bpy_struct, settings: dict) -> None:
     cycles.adaptive_min_samples = max(4, settings["samples"] // 4)
     cycles.use_animated_seed = False
     cycles.time_limit = 0.0
-    # Picking lamps by a tree costs a quarter more here, and looks the same once denoised.
-    cycles.use_light_tree = False
+    cycles.use_light_tree = settings["light_tree"]
     cycles.use_auto_tile = False
     cycles.max_bounces = bounces
     cycles.diffuse_bounces = bounces
@@ -80,13 +82,13 @@ def _configure_sampling(cycles: bpy.types.bpy_struct, settings: dict) -> None:
     cycles.volume_bounces = 0
     cycles.caustics_reflective = cycles.caustics_refractive = False
     cycles.blur_glossy = 1.0
-    cycles.sample_clamp_direct, cycles.sample_clamp_indirect = CLAMP_DIRECT, CLAMP_INDIRECT
+    cycles.sample_clamp_direct, cycles.sample_clamp_indirect = CLAMP_DIRECT, settings["clamp_indirect"]
 
 
-def _configure_denoiser(cycles: bpy.types.bpy_struct, denoise: bool) -> None:
-    cycles.use_denoising = denoise
+def _configure_denoiser(cycles: bpy.types.bpy_struct, settings: dict) -> None:
+    cycles.use_denoising = settings["denoise"]
     cycles.denoiser = "OPENIMAGEDENOISE"
     cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
-    cycles.denoising_prefilter = "ACCURATE"
+    cycles.denoising_prefilter = settings["denoise_guides"].upper()
     if hasattr(cycles, "denoising_use_gpu"):
         cycles.denoising_use_gpu = cycles.device == "GPU"

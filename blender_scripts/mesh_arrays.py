@@ -29,6 +29,15 @@ def set_vertices(mesh: bpy.types.Mesh, vertices_m: np.ndarray) -> None:
     mesh.update()
 
 
+def set_velocity(mesh: bpy.types.Mesh, moved_m: np.ndarray) -> None:
+    """How far each vertex moves in a frame, f32[P, 3]; Cycles blurs by the attribute of this name, per second."""
+    render = bpy.context.scene.render
+    velocity = mesh.attributes.get("velocity") or mesh.attributes.new("velocity", "FLOAT_VECTOR", "POINT")
+    velocity.data.foreach_set(
+        "vector", np.ascontiguousarray(moved_m * (render.fps / render.fps_base), np.float32).ravel()
+    )
+
+
 def shade_smooth(mesh: bpy.types.Mesh, sharp_angle_rad: float | None = None) -> None:
     """Smooth shading everywhere, or except across edges sharper than an angle."""
     mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))

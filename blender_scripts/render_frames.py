@@ -21,76 +21,134 @@ sys.path.insert(0, str(Path(__file__).parent))
 import auto_exposure
 import bpy
 import cycles_settings
+import eevee_settings
 import numpy as np
 import opencv_cameras
 from actor_scene import Actor, add_actors, pose_all
-from frame_output import FrameOutput
+from frame_output import GroundTruth, Picture, empty_tree
 from job_arrays import JobArrays
 from room_scene import load_room
 from worker_link import Worker, read_job, write_atomically
 
 METERED_FRAMES = 3
+# Blender's frame at which everything is where it belongs; only motion blur looks at its neighbours.
+MOMENT = 1
+
+
+class Cameras:
+    """The scene's cameras, which all views share: one that stands still, and one that moves for motion blur."""
+
+    def __init__(self) -> None:
+        self.still = opencv_cameras.add_camera("camera")
+        self.moving = opencv_cameras.add_camera("moving camera")
 
 
 class View:
     """One camera of the job."""
 
-    def __init__(self, settings: dict, arrays: JobArrays) -> None:
+    def __init__(self, settings: dict, arrays: JobArrays, cameras: Cameras) -> None:
         self.number: int = settings["camera"]
         self.near_m: float | None = settings["near_m"]
+        self._cameras = cameras
         self._intrinsics = settings["intrinsics"]
         self._world_from_camera = arrays.load(settings["world_from_camera"])
-        self._object = opencv_cameras.add_camera(f"camera_{self.number}", self.near_m)
+        self._gains = arrays.load_optional(settings["gains"])
 
-    def aim(self, frame: int) -> None:
-        """Makes the next render one of this view at a frame."""
-        opencv_cameras.set_intrinsics(self._object, self._intrinsics)
-        opencv_cameras.place(self._object, np.asarray(self._world_from_camera[frame]))
+    @property
+    def stem(self) -> str:
+        """What the view's files are called."""
+        return f"view_{self.number:02d}"
+
+    def aim(self, scene: bpy.types.Scene, frame: int) -> None:
+        """Makes the scene's next render one of this view at a frame, at the very pose that the job gives."""
+        opencv_cameras.place(self._cameras.still, np.asarray(self._world_from_camera[frame]))
+        opencv_cameras.set_intrinsics(scene, self._cameras.still, self._intrinsics, self.near_m)
+
+    def aim_moving(self, scene: bpy.types.Scene, frame: int) -> None:
+        """Makes the scene's next render one of this view as it moves past a frame."""
+        poses = opencv_cameras.with_neighbours(self._world_from_camera, frame)
+        opencv_cameras.move_through(self._cameras.moving, poses, MOMENT)
+        opencv_cameras.set_intrinsics(scene, self._cameras.moving, self._intrinsics, self.near_m)
+
+    def gains(self, frame: int, development: auto_exposure.Development) -> tuple[float, float, float]:
+        """Factors of red, green and blue from linear light to the picture, the camera's own deviation included."""
+        own = 1.0 if self._gains is None else np.asarray(self._gains[frame], np.float64)
+        red, green, blue = 2.0**development.exposure_ev * np.array(development.gains) * own
+        return float(red), float(green), float(blue)
 
 
 class FrameRenderer:
-    """The loaded scene of a job."""
+    """The loaded scene of a job.
+
+    Pictures and ground truth come from one render, unless the pictures are blurred or drawn by EEVEE: then a second
+    scene of the same things, with a Cycles of its own that keeps its data, renders the ground truth at one sample.
+    """
 
     def __init__(self, worker: Worker, job: dict, folder: Path) -> None:
         self._worker, self._job, self._folder = worker, job, folder
+        settings = job["settings"]
+        self._blurred: bool = settings["motion_blur"]
         arrays = JobArrays(folder)
         load_room(job["room"], job["blend_path"], arrays)
         self._actors: list[Actor] = add_actors(job["actors"], arrays)
-        self._views = [View(settings, arrays) for settings in job["cameras"]]
-        backend, device, warning = cycles_settings.choose_device(job["device"])
-        cycles_settings.configure(job["settings"], job["threads"])
-        self._output = FrameOutput(job["settings"]["jpeg_quality"])
+        cameras = Cameras()
+        self._views = [View(view, arrays, cameras) for view in job["cameras"]]
+        self._scene = bpy.context.scene
+        self._scene.frame_set(MOMENT)
+        cycles_settings.set_threads(self._scene, job["threads"])
+        backend, device, warning = cycles_settings.choose_device(job["device"], job["worker"], job["workers"])
         worker.emit("device", backend=backend, device=device, warning=warning)
+        empty_tree(self._scene)
+        self._truth_scene = self._set_up_scenes(backend, settings)
+        self._truth = GroundTruth(self._truth_scene)
+        self._picture = Picture(self._scene, settings)
+        self._development: auto_exposure.Development | None = None
+
+    def _set_up_scenes(self, backend: str, settings: dict) -> bpy.types.Scene:
+        """Configures the picture's scene and returns the one that renders the ground truth."""
+        if settings["engine"] == "cycles" and not self._blurred:
+            cycles_settings.configure(self._scene, backend, settings)
+            return self._scene
+        truth = self._scene.copy()
+        empty_tree(truth)
+        cycles_settings.configure_truth(truth, backend, settings)
+        if settings["engine"] == "eevee":
+            eevee_settings.configure(self._scene, settings)
+        else:
+            cycles_settings.configure(self._scene, backend, settings)
+        if self._blurred:
+            cycles_settings.blur_motion(self._scene, settings["shutter"])
+        return truth
 
     def set_exposure(self) -> None:
-        """The view transform, with the exposure and white balance of this job (metered once)."""
-        view = bpy.context.scene.view_settings
-        view.view_transform = self._job["settings"]["view_transform"]
-        view.look = self._job["settings"]["look"]
-        view.gamma = 1.0
-        view.use_curve_mapping = False
+        """The exposure and white balance of this job (metered once)."""
         path = self._folder / "exposure.json"
         development = auto_exposure.read_stored(path)
         if development is None:
             development = auto_exposure.develop(self._meter(), self._job["settings"]["white_balance"])
             auto_exposure.store(path, development)
-        view.exposure = development.exposure_ev
-        self._output.set_gains(development.gains)
+        self._development = development
         self._worker.emit("ready", exposure_ev=development.exposure_ev, gains=development.gains)
 
     def _meter(self) -> np.ndarray:
         """Linear pixels f32[N, 3] of all views at a few frames; cutaways do not count beside whole views."""
         frames = self._job["frames"]
         views = [view for view in self._views if view.near_m is None] or self._views
-        test = auto_exposure.TestRender(self._folder)
+        test = auto_exposure.TestRender(self._scene, self._folder)
         pixels = []
         for frame in sorted({round(k * (frames - 1) / (METERED_FRAMES - 1)) for k in range(METERED_FRAMES)}):
-            pose_all(self._actors, frame)
+            pose_all(self._actors, frame, self._blurred)
             for view in views:
-                view.aim(frame)
+                self._aim(view, frame)
                 pixels.append(test.pixels())
                 self._worker.emit("metered", frame=frame)
         return np.concatenate(pixels)
+
+    def _aim(self, view: View, frame: int) -> None:
+        if self._blurred:
+            view.aim_moving(self._scene, frame)
+        else:
+            view.aim(self._scene, frame)
 
     def render(self, frame: int) -> None:
         """Renders all views of a frame and puts its folder in place."""
@@ -100,20 +158,41 @@ class FrameRenderer:
         for stale in (temporary, final):
             shutil.rmtree(stale, ignore_errors=True)
         temporary.mkdir(parents=True)
-        pose_all(self._actors, frame)
-        bpy.context.scene.cycles.seed = frame
-        files: dict[str, dict] = {}
-        for view in self._views:
-            self._worker.check_parent()
-            view.aim(frame)
-            for path in self._output.render(temporary, f"view_{view.number:02d}"):
-                files[path.name] = _fingerprint(path)
-            self._worker.emit("view", frame=frame, camera=view.number)
+        pose_all(self._actors, frame, self._blurred)
+        self._render_pictures(frame, temporary)
+        if self._truth_scene != self._scene:
+            self._render_truth(frame, temporary)
+        files = {path.name: _fingerprint(path) for path in sorted(temporary.iterdir())}
         seconds = time.monotonic() - started
         content = {"frame": frame, "seconds": seconds, "files": files}
         write_atomically(temporary / "frame.json", json.dumps(content).encode())
         temporary.rename(final)
         self._worker.emit("frame", frame=frame, seconds=seconds)
+
+    def _render_pictures(self, frame: int, folder: Path) -> None:
+        """The JPEG of each view, and its EXR where one render makes both."""
+        assert self._development is not None
+        self._scene.cycles.seed = frame
+        for view in self._views:
+            self._worker.check_parent()
+            self._aim(view, frame)
+            noise = np.random.default_rng([self._job["noise_seed"], view.number, frame])
+            self._picture.develop_with(view.gains(frame, self._development), noise)
+            self._truth.write_to(folder)
+            bpy.ops.render.render(write_still=False, scene=self._scene.name)
+            self._picture.save(folder / f"{view.stem}.jpg")
+            if self._truth_scene == self._scene:
+                self._truth.finish(folder, f"{view.stem}.exr")
+            self._worker.emit("view", frame=frame, camera=view.number)
+
+    def _render_truth(self, frame: int, folder: Path) -> None:
+        """The EXR of each view, after all pictures: from scene to scene Cycles loads everything again."""
+        for view in self._views:
+            view.aim(self._truth_scene, frame)
+            self._truth.write_to(folder)
+            bpy.ops.render.render(write_still=False, scene=self._truth_scene.name)
+            self._truth.finish(folder, f"{view.stem}.exr")
+            self._worker.emit("truth", frame=frame, camera=view.number)
 
 
 def _fingerprint(path: Path) -> dict:

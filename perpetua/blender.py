@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import selectors
 import shutil
 import signal
@@ -21,17 +22,37 @@ PARENT_PIPE_VARIABLE = "PERPETUA_PARENT_PIPE"
 TAIL_LINES = 12
 READ_BYTES = 65536
 
+# What Blender, Cycles' devices and Python print when memory runs out.
+GPU_MEMORY_WORDS = re.compile(
+    r"out of (gpu|device|video)|gpu and shared host memory|_ERROR_OUT_OF_(DEVICE_)?MEMORY|hipErrorOutOfMemory"
+    r"|out of memory in (cuda|hip|optix)",
+    re.IGNORECASE,
+)
+MEMORY_WORDS = re.compile(
+    r"MemoryError|bad_alloc|out of memory|cannot allocate memory|[cm]alloc\w* returns null|failed to allocate",
+    re.IGNORECASE,
+)
+# EEVEE on a machine without a graphics driver ends Blender with one of these.
+NO_GRAPHICS_WORDS = ("Couldn't find current GLX or EGL context", "Failed to initialize the GPU", "No OpenGL vendor")
+
 Event = dict[str, Any]
 
 
 class BlenderError(StageError):
-    """A Blender process crashed, failed or hung (``silent``). ``reason`` is one clause; ``tail`` its last lines."""
+    """A Blender process crashed, failed, hung (``silent``) or ran out of memory (``memory``, ``gpu_memory``).
 
-    def __init__(self, reason: str, tail: str, silent: bool = False) -> None:
+    ``reason`` is one clause; ``tail`` its last lines.
+    """
+
+    def __init__(
+        self, reason: str, tail: str, silent: bool = False, memory: bool = False, gpu_memory: bool = False
+    ) -> None:
         super().__init__(f"{reason}\n{tail}" if tail else reason)
         self.reason = reason
         self.tail = tail
         self.silent = silent
+        self.memory = memory
+        self.gpu_memory = gpu_memory
 
 
 def run_script(
@@ -61,11 +82,11 @@ def run_script(
     log_path = scratch / f"{script.stem}.log"
     with log_path.open("wb") as log:
         process = subprocess.Popen(
-            _command(script, job_path, blender),
+            script_command(script, job_path, blender),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=log,
-            env=_environment(scratch),
+            env=script_environment(scratch),
             start_new_session=True,
         )
         try:
@@ -81,7 +102,8 @@ def run_script(
         raise _explain_exit(code, _tail(log_path))
 
 
-def _command(script: Path, job_path: Path, blender: str | None) -> list[str]:
+def script_command(script: Path, job_path: Path, blender: str | None) -> list[str]:
+    """The command line that runs a script of Blender on a job, with the bpy package or a Blender program."""
     if blender is None:
         return [sys.executable, str(script), str(job_path)]
     program = shutil.which(blender)
@@ -91,7 +113,7 @@ def _command(script: Path, job_path: Path, blender: str | None) -> list[str]:
     return [program, *options, "-P", str(script), "--", str(job_path)]
 
 
-def _environment(scratch: Path) -> dict[str, str]:
+def script_environment(scratch: Path) -> dict[str, str]:
     """Ours, with a settings folder of Blender's own: none of the user's add-ons, nothing written to their home."""
     resources = scratch.resolve() / "blender_user"
     resources.mkdir(exist_ok=True)
@@ -150,8 +172,16 @@ def _explain_exit(code: int, tail: str) -> StageError | EnvironmentSetupError:
             "Blender needs a system library that is not installed; on Debian: apt-get install "
             f"{' '.join(SYSTEM_LIBRARIES.values())}\n{tail}"
         )
-    if code >= 0:
-        return BlenderError(f"Blender ended with exit code {code}", tail)
-    name = signal.Signals(-code).name
-    hint = " (memory ran out, or someone stopped it)" if name == "SIGKILL" else ""
-    return BlenderError(f"Blender was ended by {name}{hint}", tail)
+    if any(words in tail for words in NO_GRAPHICS_WORDS):
+        return EnvironmentSetupError(
+            "render.engine=eevee needs a graphics driver with OpenGL, which this machine has not: set "
+            f"render.engine=cycles\n{tail}"
+        )
+    end = f"Blender ended with exit code {code}" if code >= 0 else f"Blender was ended by {signal.Signals(-code).name}"
+    if GPU_MEMORY_WORDS.search(tail):
+        return BlenderError(f"{end}: the GPU's memory ran out", tail, gpu_memory=True)
+    if MEMORY_WORDS.search(tail):
+        return BlenderError(f"{end}: memory ran out", tail, memory=True)
+    if -code == signal.SIGKILL:
+        return BlenderError(f"{end} (memory ran out, or someone stopped it)", tail, memory=True)
+    return BlenderError(end, tail)

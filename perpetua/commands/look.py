@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from perpetua.commands.options import DEVICES
+from perpetua.commands.options import DEVICE_OPTION
 from perpetua.config import load_config
 from perpetua.errors import InputError
 
@@ -33,7 +33,7 @@ PICTURE_SUFFIXES = (".png", ".jpg")
 @click.option(
     "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="With --actors or --rooms: change one setting."
 )
-@click.option("--device", type=click.Choice(DEVICES), default="auto", show_default=True, help="What Cycles renders on.")
+@DEVICE_OPTION
 def preview(
     sequence: Path | None,
     out: Path | None,

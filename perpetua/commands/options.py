@@ -5,7 +5,11 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-DEVICES = ("auto", "cpu", "cuda", "optix", "hip", "metal", "oneapi")
+from perpetua.rendering.devices import DEVICES
+
+DEVICE_OPTION = click.option(
+    "--device", type=click.Choice(DEVICES), default="auto", show_default=True, help="What Cycles renders on."
+)
 OUT_OPTION = click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True,
     help="Output folder.",

@@ -260,6 +260,7 @@ def _render(context: StageContext) -> tuple[RenderedView, ...]:
         context.folder / RENDER_JOB_FOLDER,
         context.on_frame,
         result_dir=context.folder,
+        seed=context.seed,
     )
 
 

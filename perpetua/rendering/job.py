@@ -19,8 +19,11 @@ from perpetua.blender import SCRIPT_FOLDER
 from perpetua.cameras.types import CameraPath
 from perpetua.files import file_sha256, write_json
 from perpetua.rendering.config import RenderConfig
+from perpetua.rendering.devices import cpu_threads, machine_share
 from perpetua.rendering.scripts import scripts_sha256
+from perpetua.rendering.sensor import noise_seed, view_gains
 from perpetua.rooms.types import AreaLight, Material, Room, SceneObject
+from perpetua.seeding import StageSeed
 
 RENDER_SCRIPT = SCRIPT_FOLDER / "render_frames.py"
 JOB_FILE = "job.json"
@@ -29,6 +32,8 @@ EXPOSURE_FILE = "exposure.json"
 FRAME_FOLDER = "frames"
 # Settings of how the work is done, which do not change what comes out.
 PROCESS_SETTINGS = frozenset({"frame_timeout_s", "max_restarts", "blender", "threads"})
+# For pictures that belong to no sequence.
+NO_SEED = StageSeed(0, 0, "render")
 
 Settings = dict[str, Any]
 
@@ -41,10 +46,12 @@ def write_job(
     config: RenderConfig,
     device: str,
     near_m: Mapping[int, float],
+    seed: StageSeed = NO_SEED,
 ) -> Path:
     """Writes a job into an existing folder; what an earlier, different job left there is removed.
 
-    ``near_m`` holds, by number of camera, where its view begins, if not at the camera.
+    ``near_m`` holds, by number of camera, where its view begins, if not at the camera. ``seed`` decides how cameras
+    deviate from ideal ones.
 
     Returns:
         The path of job.json.
@@ -55,7 +62,12 @@ def write_job(
         "frames": len(cameras[0].world_from_camera),
         "room": _room_settings(room, writer),
         "actors": [_actor_settings(actor, writer) for actor in actors],
-        "cameras": [_camera_settings(camera, near_m.get(camera.camera), writer) for camera in cameras],
+        "cameras": [
+            _camera_settings(camera, near_m.get(camera.camera), writer)
+            | {"gains": _gains(camera, config, seed, writer)}
+            for camera in cameras
+        ],
+        "noise_seed": noise_seed(seed),
         "settings": config.model_dump(mode="json", exclude=set(PROCESS_SETTINGS)),
     }
     digest = hashlib.sha256(json.dumps(job, sort_keys=True).encode()).hexdigest()
@@ -64,7 +76,15 @@ def write_job(
         shutil.rmtree(folder / FRAME_FOLDER, ignore_errors=True)
         (folder / EXPOSURE_FILE).unlink(missing_ok=True)
     blend_path = None if room.blend_path is None else str(room.blend_path.resolve())
-    job |= {"digest": digest, "blend_path": blend_path, "device": device, "threads": config.threads}
+    share = machine_share()
+    job |= {
+        "digest": digest,
+        "blend_path": blend_path,
+        "device": device,
+        "threads": cpu_threads(config.threads, share),
+        "worker": share.worker,
+        "workers": share.workers,
+    }
     write_json(path, job)
     return path
 
@@ -158,6 +178,11 @@ def _actor_settings(actor: ActorMesh, writer: _ArrayWriter) -> Settings:
         "vertices_m": writer.write("vertices_m", actor.vertices_m),
         "parts": parts,
     }
+
+
+def _gains(camera: CameraPath, config: RenderConfig, seed: StageSeed, writer: _ArrayWriter) -> str | None:
+    gains = view_gains(config.sensor, camera.camera, len(camera.world_from_camera), seed)
+    return None if gains is None else writer.write("gains", gains)
 
 
 def _camera_settings(camera: CameraPath, near_m: float | None, writer: _ArrayWriter) -> Settings:

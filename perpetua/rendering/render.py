@@ -10,17 +10,18 @@ from perpetua.actors.types import ActorMesh
 from perpetua.blender import BlenderError, Event, run_script
 from perpetua.cameras.types import CameraPath
 from perpetua.errors import RenderError
-from perpetua.files import write_json
+from perpetua.files import read_json, write_json
 from perpetua.rendering.bake import bake_room
 from perpetua.rendering.config import RenderConfig
+from perpetua.rendering.devices import DEVICES
 from perpetua.rendering.frames import DamagedFrameError, assemble_view, drop_damaged
-from perpetua.rendering.job import FRAME_FOLDER, PENDING_FILE, RENDER_SCRIPT, write_job
+from perpetua.rendering.job import FRAME_FOLDER, NO_SEED, PENDING_FILE, RENDER_SCRIPT, write_job
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.types import Room
+from perpetua.seeding import StageSeed
 
 logger = logging.getLogger(__name__)
 
-DEVICES = ("auto", "cpu", "cuda", "optix", "hip", "metal", "oneapi")
 MAX_OBJECT_INDEX = 65535
 WHOLE_VIEWS: Mapping[int, float] = MappingProxyType({})
 
@@ -36,6 +37,7 @@ def render_views(
     script: Path = RENDER_SCRIPT,
     result_dir: Path | None = None,
     near_m: Mapping[int, float] = WHOLE_VIEWS,
+    seed: StageSeed = NO_SEED,
 ) -> tuple[RenderedView, ...]:
     """Renders synchronized RGB, depth and object index of all views.
 
@@ -54,19 +56,21 @@ def render_views(
         result_dir: folder for the files that the returned arrays are mapped from; None: ``work_dir``.
         near_m: by number of camera, the depth at which its view begins: what is nearer is left out of the picture,
             and still blocks and reflects light. Exposure is not metered on such a cutaway.
+        seed: decides how cameras deviate from ideal ones (``config.sensor``).
 
     Returns:
         One view per camera, in the order of the cameras.
 
     Raises:
-        RenderError: Blender failed more than ``config.max_restarts`` times, or the job cannot be rendered.
+        RenderError: Blender failed more than ``config.max_restarts`` times in a row without a new frame, or the job
+            cannot be rendered.
         EnvironmentSetupError: a system library that Blender needs is not installed.
     """
     frame_count = _check_job(room, actors, cameras, device)
     work_dir.mkdir(parents=True, exist_ok=True)
     if room.blend_path is not None:
         room = replace(room, blend_path=bake_room(room, config, frame_count * len(cameras), work_dir))
-    job_path = write_job(work_dir, room, actors, cameras, config, device, near_m)
+    job_path = write_job(work_dir, room, actors, cameras, config, device, near_m, seed)
     frames = work_dir / FRAME_FOLDER
     repeats = 0
     while True:
@@ -105,10 +109,11 @@ def _render_pending(
     on_frame: Callable[[int, int, float], None],
     script: Path,
 ) -> None:
-    """Starts Blender until no frame is missing, at most ``config.max_restarts`` times more than once."""
+    """Starts Blender until no frame is missing; each new frame renews the number of restarts that it has."""
     frames = job_path.parent / FRAME_FOLDER
     restarts = 0
-    while pending := drop_damaged(frames, cameras, frame_count):
+    pending = drop_damaged(frames, cameras, frame_count)
+    while pending:
         write_json(job_path.parent / PENDING_FILE, {"frames": pending})
         listener = _Listener(frame_count, len(pending), on_frame)
         try:
@@ -125,19 +130,35 @@ def _render_pending(
             failure = error
         if not (left := drop_damaged(frames, cameras, frame_count)):
             return
+        restarts = 0 if len(left) < len(pending) else restarts
         if restarts == config.max_restarts:
             raise _give_up(failure, left[0], frame_count - len(left), frame_count, restarts)
         restarts += 1
         logger.warning("%s; restart %d of %d at frame %d", failure.reason, restarts, config.max_restarts, left[0])
+        if failure.gpu_memory:
+            _go_on_without_gpu(job_path)
+        pending = left
+
+
+def _go_on_without_gpu(job_path: Path) -> None:
+    logger.warning("the GPU's memory does not hold this room: going on with the CPU")
+    write_json(job_path, read_json(job_path) | {"device": "cpu"})
 
 
 def _give_up(failure: BlenderError, frame: int, done: int, frame_count: int, restarts: int) -> RenderError:
     return RenderError(
         f"rendering stopped at frame {frame} ({done} of {frame_count} frames are done and kept) after {restarts} "
-        f"restarts: {failure.reason}; if memory ran out, lower render.width_px, render.height_px or render.max_texels; "
-        "if a frame takes long, raise render.frame_timeout_s; on a GPU, try --device cpu"
+        f"restarts: {failure.reason}; {_remedy(failure)}"
         + (f"\nBlender's last lines:\n{failure.tail}" if failure.tail else "")
     )
+
+
+def _remedy(failure: BlenderError) -> str:
+    if failure.memory:
+        return "lower --workers, render.width_px, render.height_px or render.max_texels"
+    if failure.silent:
+        return "raise render.frame_timeout_s if a frame takes that long; on a GPU, try --device cpu"
+    return "run the same command again, on a GPU with --device cpu"
 
 
 class _Listener:

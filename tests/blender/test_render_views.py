@@ -15,64 +15,28 @@ import numpy as np
 import pytest
 from jaxtyping import Float64
 from PIL import Image
+from plane_scene import (
+    ACTOR_INDEX,
+    CONFIG,
+    FRAMES,
+    NORMAL,
+    OFFSET_M,
+    PATCH_HEIGHT_M,
+    PLANE_INDEX,
+    assert_same,
+    patch,
+    plane_room,
+    two_cameras,
+)
 
-from perpetua.actors.types import ActorMesh, ActorPart
+from perpetua.actors.types import ActorMesh
 from perpetua.cameras.types import CameraPath
-from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics, unproject
 from perpetua.geometry.transforms import look_at, transform_points
-from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
 from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import AreaLight, Material, Room, SceneObject
 
 pytestmark = pytest.mark.blender
-
-FRAMES = 3
-PLANE_INDEX, PATCH_INDEX, ACTOR_INDEX = 7, 300, 41
-# The slanted plane n . x = d; no symmetry that a wrong axis or sign could hide behind.
-NORMAL = np.array([0.36, -0.48, 0.8])
-OFFSET_M = -0.5
-# The actor's front is a square patch parallel to the plane, this far before it at frame t.
-PATCH_HEIGHT_M = np.array([0.3, 0.5, 0.75])
-CONFIG = RenderConfig(width_px=64, height_px=48, samples=8, denoise=True)
-SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-TWO_TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
-
-
-def _in_plane(offset_m: float, half_side_m: float) -> Float64[np.ndarray, "4 3"]:
-    """Corners of a square with ``NORMAL`` in the plane n . x = offset_m."""
-    across = np.cross(NORMAL, [0.0, 0.0, 1.0])
-    across /= np.linalg.norm(across)
-    up = np.cross(NORMAL, across)
-    return np.asarray(NORMAL * offset_m + half_side_m * (SQUARE[:, :1] * across + SQUARE[:, 1:] * up))
-
-
-def _room(power_w: float = 400.0) -> Room:
-    grey = Material("grey", (0.5, 0.5, 0.5), (0.2, 0.2, 0.2), pattern="checks", scale_m=0.5)
-    plane = SceneObject(
-        PLANE_INDEX, "plane", "wall", TriMesh(_in_plane(OFFSET_M, 20.0), TWO_TRIANGLES), grey, False, True
-    )
-    light = AreaLight((2.0, -3.0, 5.0), (-0.3, 0.4, -1.0), (1.0, 0.5), power_w, (1.0, 0.95, 0.9))
-    return Room("plane", "livingroom", SQUARE, 2.5, (plane,), (light,), None)
-
-
-def _actor() -> ActorMesh:
-    vertices_m = np.stack([_in_plane(OFFSET_M + height_m, 0.5) for height_m in PATCH_HEIGHT_M]).astype(np.float32)
-    uv = np.zeros((2, 3, 2), np.float32)
-    image = np.full((4, 4, 3), (200, 30, 30), np.uint8)
-    part = ActorPart("patch", TWO_TRIANGLES, uv, Material("red", (0.5, 0.5, 0.5), image=image))
-    return ActorMesh(0, ACTOR_INDEX, "a red patch", (part,), vertices_m)
-
-
-def _cameras() -> tuple[CameraPath, ...]:
-    """One centred camera, and one with its principal point off the centre and rectangular pixels; both move."""
-    target_m = NORMAL * OFFSET_M + np.array([0.2, 0.1, 0.0])
-    position_m = target_m + NORMAL * 2.5 + np.array([[0.4, -0.7, 0.6], [0.9, -0.4, 0.3], [1.5, 0.3, 0.1]])
-    centred = CameraPath(0, look_at(position_m, np.tile(target_m, (FRAMES, 1))), Intrinsics.centred(64, 48, 1.1))
-    skewed = Intrinsics(70.0, 55.0, 25.3, 29.1, 64, 48)
-    wide = CameraPath(1, look_at(position_m[::-1] + np.array([-1.1, 0.2, 0.4]), np.tile(target_m, (FRAMES, 1))), skewed)
-    return centred, wide
 
 
 def _points_at(camera: CameraPath, depth_m: Float64[np.ndarray, "H W"], frame: int) -> Float64[np.ndarray, "H W 3"]:
@@ -86,11 +50,11 @@ def _points_at(camera: CameraPath, depth_m: Float64[np.ndarray, "H W"], frame: i
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[RenderedView, ...]:
     folder = tmp_path_factory.mktemp("undisturbed")
-    return render_views(_room(), (_actor(),), _cameras(), CONFIG, "cpu", folder, lambda *_: None)
+    return render_views(plane_room(), (patch(),), two_cameras(), CONFIG, "cpu", folder, lambda *_: None)
 
 
 def test_every_pixel_lies_on_the_surface_it_shows(undisturbed: tuple[RenderedView, ...]) -> None:
-    for camera, view in zip(_cameras(), undisturbed, strict=True):
+    for camera, view in zip(two_cameras(), undisturbed, strict=True):
         for frame in range(FRAMES):
             along_normal_m = _points_at(camera, view.depth_m[frame].astype(np.float64), frame) @ NORMAL
             index = view.object_index[frame]
@@ -102,9 +66,9 @@ def test_every_pixel_lies_on_the_surface_it_shows(undisturbed: tuple[RenderedVie
 
 def test_the_actor_is_exactly_where_its_vertices_are(undisturbed: tuple[RenderedView, ...]) -> None:
     """A pixel shows the actor exactly if its ray meets the patch, but for rays within 1 mm of the patch's rim."""
-    for camera, view in zip(_cameras(), undisturbed, strict=True):
+    for camera, view in zip(two_cameras(), undisturbed, strict=True):
         for frame in range(FRAMES):
-            corners_m = _actor().vertices_m[frame].astype(np.float64)
+            corners_m = patch().vertices_m[frame].astype(np.float64)
             origin_m = camera.world_from_camera[frame][:3, 3]
             rays_m = _points_at(camera, np.ones((48, 64)), frame) - origin_m
             scale = (corners_m[0] @ NORMAL - origin_m @ NORMAL) / (rays_m @ NORMAL)
@@ -126,12 +90,12 @@ def test_pictures_show_the_image_texture(undisturbed: tuple[RenderedView, ...]) 
 
 def test_exposure_makes_up_for_the_lamps(tmp_path: Path, undisturbed: tuple[RenderedView, ...]) -> None:
     """With a hundredth of the light (the sky is far below the lamp) the picture stays about as bright."""
-    camera = CameraPath(0, _cameras()[0].world_from_camera[:1], _cameras()[0].intrinsics)
-    actor = ActorMesh(0, ACTOR_INDEX, "", _actor().parts, _actor().vertices_m[:1])
+    camera = CameraPath(0, two_cameras()[0].world_from_camera[:1], two_cameras()[0].intrinsics)
+    actor = ActorMesh(0, ACTOR_INDEX, "", patch().parts, patch().vertices_m[:1])
     levels = []
     for power_w in (4e4, 4e6):
         folder = tmp_path / f"{power_w:g}"
-        (view,) = render_views(_room(power_w), (actor,), (camera,), CONFIG, "cpu", folder, lambda *_: None)
+        (view,) = render_views(plane_room(power_w), (actor,), (camera,), CONFIG, "cpu", folder, lambda *_: None)
         levels.append(float(np.asarray(Image.open(BytesIO(view.jpeg[0]))).mean()))
     assert 60.0 < levels[0] < 190.0
     assert abs(levels[0] - levels[1]) < 3.0
@@ -139,8 +103,8 @@ def test_exposure_makes_up_for_the_lamps(tmp_path: Path, undisturbed: tuple[Rend
 
 def test_white_balance_takes_the_lamps_colour_out(tmp_path: Path) -> None:
     """A grey plane under an orange lamp."""
-    camera = CameraPath(0, _cameras()[0].world_from_camera[:1], _cameras()[0].intrinsics)
-    room = _room()
+    camera = CameraPath(0, two_cameras()[0].world_from_camera[:1], two_cameras()[0].intrinsics)
+    room = plane_room()
     orange = replace(room, lights=(replace(room.lights[0], power_w=4e5, color=(1.0, 0.6, 0.3)),))
     red_per_blue = []
     for strength in (0.0, 1.0):
@@ -160,17 +124,25 @@ def test_background_has_no_depth_and_no_index_and_a_missing_gpu_is_said(
     away = look_at(np.array([[0.4, -2.0, 3.0]]), np.array([[0.4, -5.0, 6.0]]))
     camera = CameraPath(0, away, Intrinsics.centred(64, 48, 1.0))
     with caplog.at_level(logging.WARNING):
-        (view,) = render_views(_room(), (), (camera,), CONFIG, absent, tmp_path, lambda *_: None)
+        (view,) = render_views(plane_room(), (), (camera,), CONFIG, absent, tmp_path, lambda *_: None)
     assert not view.depth_m.any()
     assert not view.object_index.any()
     assert f"no {absent} device" in caplog.text
 
 
-def _assert_same(views: tuple[RenderedView, ...], others: tuple[RenderedView, ...]) -> None:
-    for view, other in zip(views, others, strict=True):
-        assert view.jpeg == other.jpeg
-        np.testing.assert_array_equal(view.depth_m, other.depth_m)
-        np.testing.assert_array_equal(view.object_index, other.object_index)
+def test_a_blender_program_renders_the_same(tmp_path: Path, undisturbed: tuple[RenderedView, ...]) -> None:
+    """A stand-in that takes Blender's arguments and runs the script as Blender does: its own arguments and all."""
+    program = tmp_path / "blender"
+    program.write_text(
+        f"#!{sys.executable}\nimport runpy, sys\n"
+        "print('Blender 4.2.0 (a stand-in)', flush=True)\n"
+        "assert sys.argv[1:4] == ['-b', '--factory-startup', '--disable-autoexec']\n"
+        "runpy.run_path(sys.argv[sys.argv.index('-P') + 1], run_name='__main__')\n"
+    )
+    program.chmod(0o755)
+    config = CONFIG.model_copy(update={"blender": str(program), "threads": 1})
+    views = render_views(plane_room(), (patch(),), two_cameras(), config, "cpu", tmp_path / "job", lambda *_: None)
+    assert_same(views, undisturbed)
 
 
 def _children() -> set[int]:
@@ -191,9 +163,9 @@ def test_a_killed_worker_is_replaced_and_the_result_is_the_same(
             for pid in _children() - others:
                 os.kill(pid, signal.SIGKILL)
 
-    views = render_views(_room(), (_actor(),), _cameras(), CONFIG, "cpu", tmp_path, kill_after_first_frame)
+    views = render_views(plane_room(), (patch(),), two_cameras(), CONFIG, "cpu", tmp_path, kill_after_first_frame)
     assert [first_frame.stat().st_mtime_ns] == changed_ns
-    _assert_same(views, undisturbed)
+    assert_same(views, undisturbed)
 
 
 def _render_until_killed(folder: Path) -> None:
@@ -201,7 +173,7 @@ def _render_until_killed(folder: Path) -> None:
         (folder / "child").write_text(" ".join(map(str, _children())))
         os.kill(os.getpid(), signal.SIGKILL)
 
-    render_views(_room(), (_actor(),), _cameras(), CONFIG, "cpu", folder, die)
+    render_views(plane_room(), (patch(),), two_cameras(), CONFIG, "cpu", folder, die)
 
 
 def test_when_the_parent_is_killed_blender_ends_and_another_run_resumes(
@@ -221,8 +193,8 @@ def test_when_the_parent_is_killed_blender_ends_and_another_run_resumes(
     assert len(kept) >= 1
     progress: list[int] = []
     views = render_views(
-        _room(), (_actor(),), _cameras(), CONFIG, "cpu", tmp_path, lambda done, *_: progress.append(done)
+        plane_room(), (patch(),), two_cameras(), CONFIG, "cpu", tmp_path, lambda done, *_: progress.append(done)
     )
     assert progress == list(range(len(kept) + 1, FRAMES + 1))
     assert kept == {path: path.stat().st_mtime_ns for path in kept}
-    _assert_same(views, undisturbed)
+    assert_same(views, undisturbed)

@@ -62,8 +62,37 @@ def test_failure_shows_the_last_words(tmp_path: Path) -> None:
 
 
 def test_death_by_signal_is_named(tmp_path: Path) -> None:
-    with pytest.raises(BlenderError, match=r"SIGKILL.*memory"):
+    with pytest.raises(BlenderError, match=r"SIGKILL.*memory") as error:
         _run(tmp_path, "os.kill(os.getpid(), signal.SIGKILL)")
+    assert error.value.memory
+
+
+@pytest.mark.parametrize(
+    ("words", "memory", "gpu_memory"),
+    [
+        ("MemoryError: Unable to allocate 3.2 GiB", True, False),
+        ("terminate called after throwing an instance of 'std::bad_alloc'", True, False),
+        ("Malloc returns null: len=3145728 in pixels, total 9", True, False),
+        ("RuntimeError: Error: System is out of GPU memory", False, True),
+        ("CUDA_ERROR_OUT_OF_MEMORY in cuMemAlloc", False, True),
+        ("hipErrorOutOfMemory", False, True),
+        ("segmentation fault", False, False),
+    ],
+)
+def test_memory_that_runs_out_is_recognised(tmp_path: Path, words: str, memory: bool, gpu_memory: bool) -> None:
+    with pytest.raises(BlenderError) as error:
+        _run(tmp_path, f"sys.exit({words!r})")
+    assert (error.value.memory, error.value.gpu_memory) == (memory, gpu_memory)
+    assert ("memory ran out" in error.value.reason) == (memory or gpu_memory)
+
+
+def test_eevee_without_graphics_says_what_to_set(tmp_path: Path) -> None:
+    body = """
+        print("Assertion `0 && \\"Couldn't find current GLX or EGL context.", file=sys.stderr, flush=True)
+        os.abort()
+        """
+    with pytest.raises(EnvironmentSetupError, match=r"render\.engine=cycles"):
+        _run(tmp_path, body)
 
 
 def test_missing_system_library_names_the_packages(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """The parent's side of rendering, with workers that need no Blender: resume, restarts, damage, changed jobs."""
 
+import json
+import logging
 import textwrap
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from perpetua.errors import RenderError
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.rendering.config import RenderConfig
+from perpetua.rendering.devices import SHARE_VARIABLE
 from perpetua.rendering.frames import drop_damaged, frame_folder
 from perpetua.rendering.render import render_views
 from perpetua.rendering.types import RenderedView
@@ -119,6 +122,42 @@ def test_restarts_are_limited_and_the_error_says_why(tmp_path: Path, config: Ren
         _render(tmp_path / "work", script, config, [])
     assert "device is on fire" in str(error.value)
     assert len(list((tmp_path / "work").glob("try_*"))) == 3
+
+
+def test_each_new_frame_renews_the_restarts(tmp_path: Path, config: RenderConfig) -> None:
+    """Blender that dies once a frame gets through a job of more frames than restarts."""
+    script = _worker(tmp_path, "if frame == tries: sys.exit('again')")
+    views = _render(tmp_path / "work", script, config.model_copy(update={"max_restarts": 1}), [])
+    assert len(views[0].jpeg) == FRAMES == 4
+    assert len(list((tmp_path / "work").glob("try_*"))) == FRAMES + 1
+
+
+def test_memory_that_runs_out_is_named_with_a_remedy(tmp_path: Path, config: RenderConfig) -> None:
+    script = _worker(tmp_path, "raise MemoryError('of all memory')")
+    with pytest.raises(RenderError, match=r"memory ran out; lower --workers, render\.width_px"):
+        _render(tmp_path / "work", script, config, [])
+
+
+def test_a_gpu_whose_memory_runs_out_gives_way_to_the_cpu(
+    tmp_path: Path, config: RenderConfig, caplog: pytest.LogCaptureFixture
+) -> None:
+    fault = "if frame == 2 and job['device'] != 'cpu': sys.exit('Error: System is out of GPU and shared host memory')"
+    with caplog.at_level(logging.WARNING):
+        views = render_views(
+            _room(), (), _cameras(), config, "cuda", tmp_path / "work", lambda *_: None, script=_worker(tmp_path, fault)
+        )
+    assert [jpeg[-1:] for jpeg in views[0].jpeg] == [b"0", b"0", b"1", b"1"]
+    assert "going on with the CPU" in caplog.text
+
+
+def test_each_worker_process_is_told_its_share(
+    tmp_path: Path, config: RenderConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(SHARE_VARIABLE, "1/2")
+    monkeypatch.setattr("perpetua.rendering.devices.usable_cores", lambda: 6)
+    _render(tmp_path / "work", _worker(tmp_path), config, [])
+    job = json.loads((tmp_path / "work" / "job.json").read_text())
+    assert (job["worker"], job["workers"], job["threads"]) == (1, 2, 3)
 
 
 def test_a_worker_that_ends_well_without_its_frames_is_a_failure(tmp_path: Path, config: RenderConfig) -> None:
