@@ -110,7 +110,7 @@ def test_finished_frames_are_kept_after_a_crash(tmp_path: Path, config: RenderCo
 
 def test_a_hang_is_ended_and_the_frame_tried_again(tmp_path: Path, config: RenderConfig) -> None:
     # Shorter than the schema allows, to keep the test short.
-    impatient = config.model_copy(update={"frame_timeout_s": 2.0})
+    impatient = config.model_copy(update={"frame_timeout_s": 8.0})
     script = _worker(tmp_path, "if frame == 1 and tries == 0: time.sleep(60)")
     views = _render(tmp_path / "work", script, impatient, [])
     assert [jpeg[-1:] for jpeg in views[1].jpeg] == [b"0", b"1", b"1", b"1"]
