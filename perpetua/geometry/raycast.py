@@ -132,7 +132,7 @@ class MovingCaster:
 
     def __init__(self, vertices_m: Float32[np.ndarray, "P 3"], faces: Int32[np.ndarray, "F 3"]) -> None:
         self.vertices_m, self.faces = vertices_m, faces
-        self._warp_mesh = _make_warp_mesh(vertices_m, faces) if len(faces) else None
+        self._warp_mesh = _make_warp_mesh(vertices_m, faces, "sah") if len(faces) else None
 
     def move_to(self, vertices_m: Float32[np.ndarray, "P 3"]) -> None:
         """Puts the mesh's vertices elsewhere."""
@@ -145,12 +145,21 @@ class MovingCaster:
         """Where the corners of triangles are."""
         return self.vertices_m[self.faces[face]].astype(np.float64)
 
-    def meet(self, eye_m: Float64[np.ndarray, "3"], unit: Float32[np.ndarray, "N 3"]) -> RoughHits:
-        """The first triangle, front or back side, on each ray from a place in a direction of unit length."""
+    def meet(
+        self,
+        eye_m: Float64[np.ndarray, "3"],
+        unit: Float32[np.ndarray, "N 3"],
+        nearer_than_m: Float32[np.ndarray, " N"] | None = None,
+    ) -> RoughHits:
+        """The first triangle, front or back side, on each ray from a place in a direction of unit length.
+
+        What is not nearer than ``nearer_than_m`` on a ray is not met.
+        """
         face, distance_m = np.full(len(unit), NO_FACE, np.int32), np.full(len(unit), np.inf, np.float32)
+        limit_m = np.full(len(unit), FAR_M, np.float32) if nearer_than_m is None else np.minimum(nearer_than_m, FAR_M)
         if len(unit) and self._warp_mesh is not None:
             warp, kernel = _first_hit_kernel()
-            kinds = ((_single(unit), warp.vec3), (face, int), (distance_m, float))
+            kinds = ((_single(unit), warp.vec3), (_single(limit_m), float), (face, int), (distance_m, float))
             shared = [warp.array(values, dtype=kind, device="cpu", copy=False) for values, kind in kinds]
             warp.launch(kernel, len(unit), [self._warp_mesh.id, warp.vec3(*eye_m.tolist()), *shared], device="cpu")
         return RoughHits(distance_m, face)
@@ -174,11 +183,13 @@ def _single(values: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
-def _make_warp_mesh(vertices_m: Float[np.ndarray, "P 3"], faces: Int32[np.ndarray, "F 3"]) -> Any:
+def _make_warp_mesh(
+    vertices_m: Float[np.ndarray, "P 3"], faces: Int32[np.ndarray, "F 3"], constructor: str = "median"
+) -> Any:
     warp = _warp()
     points = warp.array(_single(vertices_m), dtype=warp.vec3, device="cpu")
     indices = warp.array(np.ascontiguousarray(faces.ravel()), dtype=int, device="cpu")
-    return warp.Mesh(points=points, indices=indices, bvh_constructor="median")
+    return warp.Mesh(points=points, indices=indices, bvh_constructor=constructor)
 
 
 @cache
@@ -204,7 +215,7 @@ def _nearest_kernel() -> tuple[Any, Any]:
         if query.result:
             offset[i] = warp.mesh_eval_position(mesh, query.face, query.u, query.v) - points[i]
 
-    return warp, warp.kernel(nearest)
+    return warp, warp.kernel(nearest, enable_backward=False, module="unique")
 
 
 @cache
@@ -217,13 +228,14 @@ def _first_hit_kernel() -> tuple[Any, Any]:
         mesh: warp.uint64,
         eye: warp.vec3,
         directions: warp.array(dtype=warp.vec3),
+        limit_m: warp.array(dtype=float),
         face: warp.array(dtype=int),
         distance_m: warp.array(dtype=float),
     ):
         i = warp.tid()
-        query = warp.mesh_query_ray(mesh, eye, directions[i], 1.0e6)
+        query = warp.mesh_query_ray(mesh, eye, directions[i], limit_m[i])
         if query.result:
             face[i] = query.face
             distance_m[i] = query.t
 
-    return warp, warp.kernel(first_hit)
+    return warp, warp.kernel(first_hit, enable_backward=False, module="unique")

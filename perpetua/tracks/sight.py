@@ -45,8 +45,9 @@ class SceneSight:
         self._go_to(frame)
         unit = directions / np.sqrt(np.einsum("nc,nc->n", directions, directions))[:, None]
         single = unit.astype(np.float32)
-        room, actors = self._room.meet(eye_m, single), self._actors.meet(eye_m, single)
-        before = actors.distance_m < room.distance_m
+        room = self._room.meet(eye_m, single)
+        actors = self._actors.meet(eye_m, single, room.distance_m)
+        before = actors.face != NO_FACE
         object_index = np.where(before, self._actor_face.owner[actors.face], self._room_face.owner[room.face])
         face = np.where(before, self._actor_face.face[actors.face], self._room_face.face[room.face])
         distance_m = np.full(len(unit), np.inf)

@@ -165,7 +165,7 @@ def _on_plane(
     planes: Planes, height_m: Float64[np.ndarray, " N"], around: _Around, seen: ViewFrame, config: TracksConfig
 ) -> Bool[np.ndarray, "N 4"]:
     """Whether rendered depth is that of each point's own plane along the rays of the pixel centres."""
-    normal = planes.normal @ seen.camera_from_world[:3, :3].T
+    normal = np.einsum("ij,nj->ni", seen.camera_from_world[:3, :3], planes.normal)
     with np.errstate(divide="ignore", invalid="ignore"):
         plane_m = -height_m[:, None] / np.einsum("nc,nkc->nk", normal, around.rays(seen.intrinsics))
         in_front_m = plane_m - around.depth_m

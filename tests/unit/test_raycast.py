@@ -113,15 +113,15 @@ def test_a_moving_mesh_is_met_where_it_is_now_as_embree_meets_it(scene: TriMesh)
         for eye_m in 1.4 * _points(4) + shift_m:
             direction = rng.normal(size=(300, 3))
             direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-            found, rough = (
-                moving.meet(eye_m, direction.astype(np.float32)),
-                moved.meet(eye_m, direction.astype(np.float32)),
-            )
+            single = direction.astype(np.float32)
+            found, rough = moving.meet(eye_m, single), moved.meet(eye_m, single)
             wanted = moved.first_hit(np.repeat(eye_m[None], 300, axis=0), direction)
             assert wanted.hit.sum() > 0
             for one in (found, rough):
                 np.testing.assert_array_equal(one.face, wanted.face)
                 np.testing.assert_allclose(one.distance_m, wanted.distance_m, rtol=1e-5)
+            near = moving.meet(eye_m, single, np.full(300, 1.0, np.float32))
+            np.testing.assert_array_equal(near.face, np.where(found.distance_m < 1.0, found.face, NO_FACE))
             hit = wanted.hit
             planes = Planes.of(moving.corner_m(found.face[hit]))
             exact_m = planes.along_m(eye_m, direction[hit], found.distance_m[hit])
