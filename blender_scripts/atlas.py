@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """UV atlases for baking: charts of faces that look the same way, projected flat and packed without overlap.
 
-Every chart keeps its metres, so texels are equally dense everywhere and stretched by 1.7 at most (a face that looks
-along a diagonal of the axes). Arrays in, arrays out: nothing here knows Blender.
+Every chart keeps its metres, so texels are stretched by 1.7 at most (a face that looks along a diagonal of the axes);
+how dense they are is each chart's own. Arrays in, arrays out: nothing here knows Blender.
 """
 
 from dataclasses import dataclass
@@ -13,6 +13,12 @@ import numpy as np
 BORDER_PX = 1
 # A chart is cut in two while it fills less of its box than this, unless the box is small.
 MIN_FILL, MIN_SPLIT_M2, MAX_SPLITS = 0.35, 0.01, 8
+# A chart is as fine as this share of its views needs; the rest, from closer by, see it magnified.
+CLOSE_QUANTILE = 0.9
+# Densities, and the scale they share, are powers of two to the power of one over these.
+LEVELS_PER_OCTAVE, SCALES_PER_OCTAVE = 2, 4
+# Below this scale nothing is left to save: each chart is its border.
+LEAST_SCALE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -32,6 +38,14 @@ class Charts:
     plane_m: np.ndarray
     chart: np.ndarray
     size_m: np.ndarray
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What cameras met of a mesh: polygons i64[N], and the pixels per metre f64[N] with which each was seen."""
+
+    polygon: np.ndarray
+    pixels_per_m: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -139,8 +153,30 @@ def connected_components(count: int, first: np.ndarray, second: np.ndarray) -> n
         label = lower
 
 
-def pack(charts: Charts, texels_per_m: float) -> Packing:
-    """Places the charts in rows (tallest first) of a nearly square image."""
+def wanted_density(charts: Charts, chart_of_polygon: np.ndarray, seen: Seen, unseen_per_m: float) -> np.ndarray:
+    """Texels per metre f64[C] that each chart should have: about the pixels per metre of its closest views.
+
+    A chart that no ray met gets the least of its mesh's seen ones, as it may be a narrow side of them; a mesh that no
+    ray met gets ``unseen_per_m``: it shows in mirrors, and colours the light.
+    """
+    density = np.full(len(charts.size_m), np.nan)
+    chart = chart_of_polygon[seen.polygon]
+    order = np.argsort(chart, kind="stable")
+    for group in np.split(order, np.flatnonzero(np.diff(chart[order])) + 1):
+        if len(group) and chart[group[0]] >= 0:
+            density[chart[group[0]]] = np.quantile(seen.pixels_per_m[group], CLOSE_QUANTILE)
+    met = ~np.isnan(density)
+    density[~met] = density[met].min() if met.any() else unseen_per_m
+    return quantised(density)
+
+
+def quantised(density: np.ndarray) -> np.ndarray:
+    """The nearest of fixed densities, so that cameras that see a mesh about alike find its images in the cache."""
+    return 2.0 ** (np.round(np.log2(density) * LEVELS_PER_OCTAVE) / LEVELS_PER_OCTAVE)
+
+
+def pack(charts: Charts, texels_per_m: np.ndarray) -> Packing:
+    """Places the charts, with densities f64[C], in rows (tallest first) of a nearly square image."""
     size_px = _size_px(charts, texels_per_m)
     width_px = max(int(size_px[:, 0].max()), round(float(np.sqrt(size_px.prod(axis=1).sum()))))
     corner_px = np.zeros((len(size_px), 2))
@@ -156,23 +192,24 @@ def pack(charts: Charts, texels_per_m: float) -> Packing:
     return Packing(width_px, int(y + row_height), corner_px)
 
 
-def _size_px(charts: Charts, texels_per_m: float) -> np.ndarray:
-    return np.ceil(charts.size_m * texels_per_m).astype(np.int64) + 2 * BORDER_PX
+def _size_px(charts: Charts, texels_per_m: np.ndarray) -> np.ndarray:
+    return np.ceil(charts.size_m * texels_per_m[:, None]).astype(np.int64) + 2 * BORDER_PX
 
 
-def texels(charts: Charts, texels_per_m: float) -> int:
-    """Texels that charts take at a density, before what packing wastes."""
+def texels(charts: Charts, texels_per_m: np.ndarray) -> int:
+    """Texels that charts take at densities f64[C], before what packing wastes."""
     return int(_size_px(charts, texels_per_m).prod(axis=1).sum())
 
 
-def shared_density(all_charts: list[Charts], boosts: list[float], budget: int) -> float:
-    """Texels per metre at which all charts together fit a budget, each mesh's density times its boost."""
-    low, high = 1e-2, 1e4
-    for _ in range(40):
-        middle = (low * high) ** 0.5
-        used = sum(texels(charts, middle * boost) for charts, boost in zip(all_charts, boosts, strict=True))
-        low, high = (middle, high) if used <= budget else (low, middle)
-    return low
+def shared_scale(all_charts: list[Charts], densities: list[np.ndarray], budget: int, most: float) -> float:
+    """The largest factor, up to ``most``, by which all wanted densities fit a budget of texels together."""
+    steps = int(np.floor(np.log2(most) * SCALES_PER_OCTAVE))
+    while True:
+        scale = 2.0 ** (steps / SCALES_PER_OCTAVE)
+        used = sum(texels(charts, scale * density) for charts, density in zip(all_charts, densities, strict=True))
+        if used <= budget or scale < LEAST_SCALE:
+            return scale
+        steps -= 1
 
 
 def blur(values: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -191,9 +228,10 @@ def _smooth(values: np.ndarray, axis: int) -> np.ndarray:
     return np.moveaxis(padded[:-2] + 2.0 * padded[1:-1] + padded[2:], 0, axis)
 
 
-def uv(charts: Charts, packing: Packing, texels_per_m: float) -> np.ndarray:
+def uv(charts: Charts, packing: Packing, texels_per_m: np.ndarray) -> np.ndarray:
     """UV f32[L, 2] of every corner; corners without a chart lie outside the image."""
     size_px = np.array([packing.width_px, packing.height_px])
     begin_px = np.append(packing.corner_px, [[0.0, 0.0]], axis=0)[charts.chart]
-    inside = (begin_px + BORDER_PX + charts.plane_m * texels_per_m) / size_px
+    corner_per_m = np.append(texels_per_m, 0.0)[charts.chart]
+    inside = (begin_px + BORDER_PX + charts.plane_m * corner_per_m[:, None]) / size_px
     return np.where(charts.chart[:, None] >= 0, inside, -2.0).astype(np.float32)

@@ -3,15 +3,17 @@
 
 import bpy
 import numpy as np
-from shader_channels import COLOR, SURFACE
+from shader_channels import COLOR, DEFAULT, GLOSS, GLOSS_INPUTS, NORMAL, SURFACE
 
 BAKED_UV = "baked"
 # Less translucency than this is not worth a second shader.
 MIN_TRANSLUCENCY = 0.02
 
 
-def build_baked_material(name: str, images: dict[str, bpy.types.Image]) -> bpy.types.Material:
-    """A material of the images of the channels "color", "surface" and, if there are bumps, "normal"."""
+def build_baked_material(
+    name: str, images: dict[str, bpy.types.Image], gloss: tuple[float, ...] | None
+) -> bpy.types.Material:
+    """A material of the images of COLOR, SURFACE and, if there are bumps, NORMAL; GLOSS is an image or constant."""
     material = bpy.data.materials.new(f"{name}_baked")
     material.use_nodes = True
     tree = material.node_tree
@@ -25,9 +27,15 @@ def build_baked_material(name: str, images: dict[str, bpy.types.Image]) -> bpy.t
     tree.links.new(color, shader.inputs["Base Color"])
     tree.links.new(surface.outputs[0], shader.inputs["Roughness"])
     tree.links.new(surface.outputs[1], shader.inputs["Metallic"])
-    normal = _normal(tree, uv, images["normal"]) if "normal" in images else None
-    if normal is not None:
-        tree.links.new(normal, shader.inputs["Normal"])
+    for socket, value in zip(GLOSS_INPUTS, DEFAULT[GLOSS] if gloss is None else gloss, strict=True):
+        shader.inputs[socket].default_value = value
+    if GLOSS in images:
+        parts = tree.nodes.new("ShaderNodeSeparateXYZ")
+        tree.links.new(_image(tree, uv, images[GLOSS]), parts.inputs[0])
+        for socket, value in zip(GLOSS_INPUTS, parts.outputs, strict=True):
+            tree.links.new(value, shader.inputs[socket])
+    if NORMAL in images:
+        tree.links.new(_normal(tree, uv, images[NORMAL]), shader.inputs["Normal"])
     result = shader.outputs[0]
     if _brightest(images[SURFACE], 2) > MIN_TRANSLUCENCY:
         result = _translucent(tree, color, surface.outputs[2], result)
@@ -66,4 +74,6 @@ def _translucent(
 def _brightest(image: bpy.types.Image, channel: int) -> float:
     values = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(values)
+    # What is in the file need not be held in memory too.
+    image.buffers_free()
     return float(values[channel::4].max())

@@ -7,7 +7,9 @@ The job holds ``kind``, ``seed``, ``dimensions_m`` (x, y, height), ``daytime``, 
 - ``room.blend``: plain meshes with materials, lamps and sky; each object's pass index is its object index.
 - ``meshes.npz``: the triangles of all objects as rendered, one after the other (see ``_write_meshes``), and those of
   Infinigen's colliders.
-- ``room.json``: kind, size, the table of objects, and the floor's outline.
+- ``room.json``: kind, size, the table of objects, and the floor's outline;
+- ``as_made.blend``, only where the job has ``as_made``: the same room with the modifiers and materials as Infinigen
+  leaves them, for the benchmark of rendering.
 
 World: Z up, metres, origin on the floor under the middle of the room.
 """
@@ -21,6 +23,7 @@ import bpy
 import numpy as np
 import procfunc
 from infinigen2.scenes import room as infinigen_rooms
+from infinigen_as_made import RAW_FILE, write_as_made
 from infinigen_categories import GLAZED, LAMPS, WALKABLE, category_of
 from infinigen_colors import tame_colors
 from infinigen_light import set_light
@@ -70,6 +73,9 @@ def main() -> None:
     made = _generate(job["kind"], job["seed"], job["dimensions_m"])
     # Infinigen's collision trees and node graphs take as much memory as the room.
     gc.collect()
+    folder, as_made = Path(job["folder"]), job.get("as_made", False)
+    if as_made:
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / RAW_FILE), copy=True)
     _make_plain(made)
     unparent(made.things + made.lamps)
     _move_origin(made, job["dimensions_m"])
@@ -78,7 +84,9 @@ def main() -> None:
     has_windows = "window" in made.categories
     set_light(made.lamps, job["dimensions_m"], job["daytime"], job["lamps_on"], has_windows)
     _tidy(made)
-    _write(Path(job["folder"]), job, made)
+    _write(folder, job, made)
+    if as_made:
+        write_as_made(folder, job, made.things, made.categories)
 
 
 def _generate(kind: str, seed: int, dimensions_m: list[float]) -> Made:

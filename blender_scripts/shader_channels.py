@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads what a surface shader is made of (colour, roughness, metal, translucency) as plain values of its node tree.
+"""Reads what a surface shader is made of (colour, roughness, metal, gloss) as plain values of its node tree.
 
 A shader cannot be baked, values can. So the tree of shaders (mixtures, groups, BSDFs) is followed from the output,
 and a tree of the same shape is built beside it that mixes the BSDFs' values by the same factors.
@@ -7,9 +7,12 @@ and a tree of the same shape is built beside it that mixes the BSDFs' values by 
 
 import bpy
 
-COLOR, SURFACE = "color", "surface"
-# SURFACE is a vector of roughness, metalness and translucency.
-DEFAULT_SURFACE = (0.5, 0.0, 0.0)
+COLOR, SURFACE, GLOSS, NORMAL = "color", "surface", "gloss", "normal"
+# SURFACE is a vector of roughness, metalness and translucency; GLOSS one of specular level, coat and sheen.
+DEFAULT = {COLOR: (0.0, 0.0, 0.0), SURFACE: (0.5, 0.0, 0.0), GLOSS: (0.5, 0.0, 0.0)}
+GLOSS_INPUTS = ("Specular IOR Level", "Coat Weight", "Sheen Weight")
+# Shaders without a mirror of their own.
+MATT = frozenset({"BSDF_DIFFUSE", "BSDF_TRANSLUCENT", "EMISSION"})
 
 Tree = bpy.types.NodeTree
 Socket = bpy.types.NodeSocket
@@ -26,7 +29,7 @@ class ChannelReader:
     def channel(self, tree: Tree, shader: Socket, channel: str) -> Socket:
         """The value of a channel of the shader that arrives at the socket ``shader``."""
         if not shader.is_linked:
-            return _constant(tree, (0.0, 0.0, 0.0) if channel == COLOR else DEFAULT_SURFACE)
+            return _constant(tree, DEFAULT[channel])
         link = shader.links[0]
         return self._of_node(tree, link.from_node, link.from_socket, channel)
 
@@ -42,7 +45,7 @@ class ChannelReader:
                 return self._of_group(tree, node, output, channel)
             case "GROUP_INPUT":
                 return self._of_group_input(tree, node, output, channel)
-        return _bsdf_color(tree, node) if channel == COLOR else _bsdf_surface(tree, node)
+        return {COLOR: _bsdf_color, SURFACE: _bsdf_surface, GLOSS: _bsdf_gloss}[channel](tree, node)
 
     def _mixed(self, tree: Tree, node: bpy.types.Node, channel: str) -> Socket:
         mix = tree.nodes.new("ShaderNodeMix")
@@ -112,13 +115,42 @@ def _bsdf_surface(tree: Tree, node: bpy.types.Node) -> Socket:
     if fallback is None and "Roughness" in node.inputs:
         _copy(tree, node.inputs["Roughness"], combine.inputs[0])
     else:
-        combine.inputs[0].default_value = DEFAULT_SURFACE[0] if fallback is None else fallback
+        combine.inputs[0].default_value = DEFAULT[SURFACE][0] if fallback is None else fallback
     if "Metallic" in node.inputs:
         _copy(tree, node.inputs["Metallic"], combine.inputs[1])
     else:
         combine.inputs[1].default_value = float(node.type in {"BSDF_GLOSSY", "BSDF_ANISOTROPIC"})
     combine.inputs[2].default_value = float(node.type == "BSDF_TRANSLUCENT")
     return combine.outputs[0]
+
+
+def _bsdf_gloss(tree: Tree, node: bpy.types.Node) -> Socket:
+    combine = tree.nodes.new("ShaderNodeCombineXYZ")
+    for name, target, value in zip(GLOSS_INPUTS, combine.inputs, _plain_gloss(node), strict=True):
+        if name in node.inputs:
+            _copy(tree, node.inputs[name], target)
+        else:
+            target.default_value = value
+    return combine.outputs[0]
+
+
+def _plain_gloss(node: bpy.types.Node) -> tuple[float, ...]:
+    """The GLOSS of a shader that has no inputs for it."""
+    return (0.0, 0.0, 0.0) if node.type in MATT else DEFAULT[GLOSS]
+
+
+def constant_gloss(tree: Tree) -> tuple[float, ...] | None:
+    """The GLOSS that all shaders of a tree have in common, or None where it differs or is textured."""
+    found = set()
+    for node in all_nodes(tree):
+        if not node.type.startswith("BSDF"):
+            continue
+        sockets = [node.inputs[name] for name in GLOSS_INPUTS if name in node.inputs]
+        if any(socket.is_linked for socket in sockets):
+            return None
+        values = tuple(round(socket.default_value, 4) for socket in sockets)
+        found.add(values if len(values) == len(GLOSS_INPUTS) else _plain_gloss(node))
+    return found.pop() if len(found) == 1 else None
 
 
 def _copy(tree: Tree, source: Socket, target: Socket) -> None:

@@ -31,7 +31,7 @@ from perpetua.pipeline.config import RedrawConfig
 from perpetua.pipeline.record import sequence_record
 from perpetua.rendering.bake import BAKE_SCRIPT
 from perpetua.rendering.job import PROCESS_SETTINGS
-from perpetua.rendering.render import RENDER_SCRIPT, render_views
+from perpetua.rendering.render import BAKED_FOLDER, RENDER_SCRIPT, render_views
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.build import build_room
 from perpetua.rooms.scene_file_checks import scene_digests
@@ -261,6 +261,8 @@ def _render(context: StageContext) -> tuple[RenderedView, ...]:
         context.on_frame,
         result_dir=context.folder,
         seed=context.seed,
+        # Beside the stages, so that it outlives this one and serves the room's next sequence.
+        cache_dir=context.folder.parent / BAKED_FOLDER,
     )
 
 

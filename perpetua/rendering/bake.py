@@ -3,11 +3,17 @@
 import hashlib
 import json
 import logging
+import shutil
+from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
+
 from perpetua.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
+from perpetua.cameras.types import CameraPath
 from perpetua.errors import RenderError
 from perpetua.files import file_sha256, write_json
+from perpetua.rendering.closeness import Closeness, measure_closeness
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.scripts import scripts_sha256
 from perpetua.rooms.types import Room
@@ -31,14 +37,21 @@ def texel_budget(config: RenderConfig, images: int) -> int:
     return min(config.max_texels, max(MIN_TEXELS, samples // SAMPLES_PER_TEXEL))
 
 
-def bake_room(room: Room, config: RenderConfig, images_ahead: int, work_dir: Path) -> Path:
-    """Bakes a room that has a .blend; kept in ``work_dir`` under a name made of its content and the budget.
+def bake_room(
+    room: Room, cameras: tuple[CameraPath, ...], config: RenderConfig, images_ahead: int, cache_dir: Path
+) -> Path:
+    """Bakes a room that has a .blend, or finds what was baked of it before.
+
+    Below ``cache_dir`` each room has a folder named by its content and the code that bakes it; those of other rooms
+    are removed. In it each image is named by the mesh it shows and its texels, so a second sequence in the room bakes
+    only the meshes that its cameras see from a different distance, and one with the same cameras none.
 
     Args:
         room: a room with a ``blend_path``.
+        cameras: what will look at it; surfaces that they come close to get finer textures.
         config: the render section of the config.
         images_ahead: how many images will be rendered of this room.
-        work_dir: existing folder for the baked file.
+        cache_dir: folder for the baked files; one process at a time uses it.
 
     Returns:
         The .blend to render: the baked one, or the room's own where baking does not pay.
@@ -52,22 +65,54 @@ def bake_room(room: Room, config: RenderConfig, images_ahead: int, work_dir: Pat
     if budget == 0:
         return room.blend_path
     source = room.blend_path.resolve()
-    key = json.dumps([file_sha256(source), scripts_sha256((BAKE_SCRIPT.name,)), budget])
-    baked = work_dir.resolve() / f"baked_{hashlib.sha256(key.encode()).hexdigest()[:24]}.blend"
+    content = _sha256([file_sha256(source), scripts_sha256((BAKE_SCRIPT.name,))])
+    closeness = measure_closeness(room, cameras)
+    folder = _only_folder(cache_dir.resolve(), content)
+    baked = folder / f"{_sha256([content, budget, _closeness_sha256(closeness)])}.blend"
     if not baked.is_file():
         logger.info("baking the room's materials to at most %.1f million texels", budget / 1e6)
-        job_path = work_dir / "bake.json"
-        write_json(job_path, {"blend_path": str(source), "out_path": str(baked), "max_texels": budget})
-        _bake(job_path, config, work_dir)
+        np.savez(folder / "closeness.npz", **asdict(closeness))
+        job = {
+            "blend_path": str(source),
+            "out_path": str(baked),
+            "closeness": str(folder / "closeness.npz"),
+            "content": content,
+            "max_texels": budget,
+        }
+        write_json(folder / "bake.json", job)
+        _bake(folder / "bake.json", config, folder)
     return baked
 
 
-def _bake(job_path: Path, config: RenderConfig, work_dir: Path) -> None:
-    texels: list[int] = []
+def _sha256(values: list[str | int]) -> str:
+    return hashlib.sha256(json.dumps(values).encode()).hexdigest()[:24]
+
+
+def _closeness_sha256(closeness: Closeness) -> str:
+    digest = hashlib.sha256()
+    for values in (closeness.object_index, closeness.triangle, closeness.pixels_per_m):
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+def _only_folder(cache_dir: Path, content: str) -> Path:
+    """The room's folder; what was baked of rooms that stood here before goes."""
+    folder = cache_dir / content
+    folder.mkdir(parents=True, exist_ok=True)
+    for other in cache_dir.iterdir():
+        if other != folder:
+            shutil.rmtree(other)
+    return folder
+
+
+def _bake(job_path: Path, config: RenderConfig, scratch: Path) -> None:
+    texels, images = 0, 0
 
     def listen(event: Event) -> None:
+        nonlocal texels, images
         if event["event"] == "baked":
-            texels.append(int(event["texels"]))
+            texels += int(event["texels"])
+            images += int(event["images"])
 
     for last_try in (False, True):
         try:
@@ -75,7 +120,7 @@ def _bake(job_path: Path, config: RenderConfig, work_dir: Path) -> None:
                 BAKE_SCRIPT,
                 job_path,
                 blender=config.blender,
-                scratch=work_dir,
+                scratch=scratch,
                 silence_timeout_s=config.frame_timeout_s,
                 on_event=listen,
             )
@@ -87,4 +132,5 @@ def _bake(job_path: Path, config: RenderConfig, work_dir: Path) -> None:
                     f"out, or switch it off with render.bake=false\nBlender's last lines:\n{error.tail}"
                 ) from None
             logger.warning("baking: %s; once more", error.reason)
-    logger.info("baked the materials of %d meshes to %.2f million texels", len(texels), sum(texels) / 1e6)
+            texels = images = 0
+    logger.info("baked %d images; the room's textures have %.2f million texels", images, texels / 1e6)

@@ -23,6 +23,7 @@ from perpetua.seeding import StageSeed
 logger = logging.getLogger(__name__)
 
 MAX_OBJECT_INDEX = 65535
+BAKED_FOLDER = "baked"
 WHOLE_VIEWS: Mapping[int, float] = MappingProxyType({})
 
 
@@ -38,6 +39,7 @@ def render_views(
     result_dir: Path | None = None,
     near_m: Mapping[int, float] = WHOLE_VIEWS,
     seed: StageSeed = NO_SEED,
+    cache_dir: Path | None = None,
 ) -> tuple[RenderedView, ...]:
     """Renders synchronized RGB, depth and object index of all views.
 
@@ -57,6 +59,7 @@ def render_views(
         near_m: by number of camera, the depth at which its view begins: what is nearer is left out of the picture,
             and still blocks and reflects light. Exposure is not metered on such a cutaway.
         seed: decides how cameras deviate from ideal ones (``config.sensor``).
+        cache_dir: folder for what is baked of the room, of use to other jobs in the same room; None: ``work_dir``.
 
     Returns:
         One view per camera, in the order of the cameras.
@@ -69,7 +72,8 @@ def render_views(
     frame_count = _check_job(room, actors, cameras, device)
     work_dir.mkdir(parents=True, exist_ok=True)
     if room.blend_path is not None:
-        room = replace(room, blend_path=bake_room(room, config, frame_count * len(cameras), work_dir))
+        baked = bake_room(room, cameras, config, frame_count * len(cameras), cache_dir or work_dir / BAKED_FOLDER)
+        room = replace(room, blend_path=baked)
     job_path = write_job(work_dir, room, actors, cameras, config, device, near_m, seed)
     frames = work_dir / FRAME_FOLDER
     repeats = 0

@@ -5,6 +5,7 @@ import json
 import shutil
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -56,15 +57,7 @@ class InfinigenRooms:
         folder = scratch.resolve() / "infinigen"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        job = {
-            "kind": wish.kind,
-            "seed": int(seed.stream("infinigen", attempt).integers(2**31)),
-            "dimensions_m": dimensions_m(wish),
-            "daytime": wish.daytime,
-            "lamps_on": wish.lamps_on,
-            "max_memory_mb": config.max_memory_mb,
-            "folder": str(folder),
-        }
+        job = room_job(wish, config, seed, attempt, folder)
         (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
         _run_script(folder, config)
         (folder / "room.blend").replace(scratch / "room.blend")
@@ -72,6 +65,19 @@ class InfinigenRooms:
         write_json(scratch / COLLIDER_GAP_FILE, asdict(_collider_gap(folder, room)))
         shutil.rmtree(folder)
         return room
+
+
+def room_job(wish: RoomWish, config: RoomsConfig, seed: StageSeed, attempt: int, folder: Path) -> dict[str, Any]:
+    """What the script is told; its files go to ``folder``."""
+    return {
+        "kind": wish.kind,
+        "seed": int(seed.stream("infinigen", attempt).integers(2**31)),
+        "dimensions_m": dimensions_m(wish),
+        "daytime": wish.daytime,
+        "lamps_on": wish.lamps_on,
+        "max_memory_mb": config.max_memory_mb,
+        "folder": str(folder),
+    }
 
 
 def dimensions_m(wish: RoomWish) -> list[float]:

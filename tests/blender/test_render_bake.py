@@ -1,8 +1,11 @@
 """Baking: the baked room looks the same, has the same ground truth, and is made once."""
 
 import logging
+import re
+import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -37,9 +40,19 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Room:
         capture_output=True,
         env={"BLENDER_USER_RESOURCES": str(folder), "PATH": ""},
     )
-    # What is rendered comes from the .blend; of the objects only the indices matter here.
-    empty = TriMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
-    boards = tuple(SceneObject(k, f"board_{k}", "board", empty, None, False, True) for k in (1, 2, 3))
+    corners_m = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    boards = tuple(
+        SceneObject(
+            k,
+            f"board_{k}",
+            "board",
+            TriMesh(corners_m + np.array([2.1 * (k - 2), 0.0, 0.0]), np.array([[0, 1, 2], [0, 2, 3]], np.int32)),
+            None,
+            False,
+            True,
+        )
+        for k in (1, 2, 3)
+    )
     return Room("boards", "livingroom", np.zeros((4, 2)), 2.5, boards, (), blend)
 
 
@@ -64,7 +77,7 @@ def test_a_baked_room_looks_the_same(
     with caplog.at_level(logging.INFO):
         baked = _render(room, CONFIG, tmp_path / "baked")
     # The two boards that share a mesh share its images; the plain board needs none.
-    assert "materials of 1 meshes" in caplog.text
+    assert "baked 4 images" in caplog.text
     plain = _render(room, CONFIG.model_copy(update={"bake": False}), tmp_path / "plain")
     np.testing.assert_array_equal(baked.depth_m, plain.depth_m)
     np.testing.assert_array_equal(baked.object_index, plain.object_index)
@@ -78,11 +91,39 @@ def test_a_baked_room_looks_the_same(
     assert reds[0].std() > 20.0
 
 
-def test_a_room_is_baked_once(room: Room, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_sequence_bakes_only_what_is_seen_otherwise(
+    room: Room, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setattr(bake, "MIN_SAMPLES", 0)
-    first = bake.bake_room(room, CONFIG, 1, tmp_path)
-    changed_ns = first.stat().st_mtime_ns
-    assert bake.bake_room(room, CONFIG, 1, tmp_path) == first
-    assert first.stat().st_mtime_ns == changed_ns
-    other = bake.bake_room(room, CONFIG.model_copy(update={"max_texels": 20_000}), 1, tmp_path)
-    assert other != first
+    cache = tmp_path / "baked"
+
+    def baked(camera: CameraPath, config: RenderConfig = CONFIG) -> tuple[Path, int]:
+        """The baked file, and how many images had to be baked for it."""
+        caplog.clear()
+        with caplog.at_level(logging.INFO):
+            path = bake.bake_room(room, (camera,), config, 1, cache)
+        counts = re.findall(r"baked (\d+) images", caplog.text)
+        return path, int(counts[0]) if counts else 0
+
+    first, count = baked(_camera())
+    assert count == 4
+    stamps = {path.name: path.stat().st_mtime_ns for path in first.parent.iterdir()}
+    assert baked(_camera()) == (first, 0)
+    # Other cameras that are as close find the images, and get a .blend of their own.
+    beside = _camera()
+    beside.world_from_camera[:, 0, 3] += 0.01
+    second, count = baked(beside)
+    assert count == 0
+    assert second != first
+    assert all((first.parent / name).stat().st_mtime_ns == stamps[name] for name in stamps if name.endswith(".png"))
+    # Closer ones need finer textures.
+    closer = _camera()
+    closer.world_from_camera[:, :3, 3] *= 0.3
+    assert baked(closer)[1] == 4
+    # What was baked of another room goes.
+    other = replace(room, blend_path=tmp_path / "other.blend")
+    shutil.copy(room.blend_path or "", other.blend_path or "")
+    with (tmp_path / "other.blend").open("ab") as stream:
+        stream.write(b" ")
+    bake.bake_room(other, (_camera(),), CONFIG, 1, cache)
+    assert not first.exists()

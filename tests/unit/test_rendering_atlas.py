@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 
 from perpetua.blender import SCRIPT_FOLDER
+from perpetua.cameras.types import CameraPath
+from perpetua.geometry.mesh import TriMesh
+from perpetua.geometry.pinhole import Intrinsics
 from perpetua.rendering.bake import bake_room, texel_budget
+from perpetua.rendering.closeness import measure_closeness
 from perpetua.rendering.config import RenderConfig
-from perpetua.rooms.types import Room
+from perpetua.rooms.types import Room, SceneObject
 
 
 @pytest.fixture(scope="module")
@@ -84,13 +88,13 @@ def test_packed_charts_do_not_overlap_and_keep_their_border(atlas: ModuleType) -
     rng = np.random.default_rng(5)
     boxes = [_box(tuple(rng.uniform(0.05, 1.5, 3))) + rng.uniform(-50, 50, 3) for _ in range(25)]
     charts = atlas.make_charts(_quads(atlas, np.concatenate(boxes)), np.ones(150, bool))
-    density = 40.0
+    density = rng.choice([20.0, 40.0, 80.0], len(charts.size_m))
     packing = atlas.pack(charts, density)
     uv_px = atlas.uv(charts, packing, density) * [packing.width_px, packing.height_px]
     taken = np.zeros((packing.height_px, packing.width_px), int)
     for chart in range(len(charts.size_m)):
         low, high = uv_px[charts.chart == chart].min(axis=0), uv_px[charts.chart == chart].max(axis=0)
-        np.testing.assert_allclose(high - low, charts.size_m[chart] * density, atol=1e-2)
+        np.testing.assert_allclose(high - low, charts.size_m[chart] * density[chart], atol=1e-2)
         assert (low > atlas.BORDER_PX - 0.01).all()
         first = np.floor(low + 0.01).astype(int) - atlas.BORDER_PX
         last = np.ceil(high - 0.01).astype(int) + atlas.BORDER_PX
@@ -99,12 +103,58 @@ def test_packed_charts_do_not_overlap_and_keep_their_border(atlas: ModuleType) -
     assert taken.mean() > 0.7
 
 
-def test_density_uses_the_budget_and_no_more(atlas: ModuleType) -> None:
+def test_the_shared_scale_uses_the_budget_and_no_more(atlas: ModuleType) -> None:
     all_charts = [atlas.make_charts(_quads(atlas, _box((k + 1.0, 2.0, 1.0))), np.ones(6, bool)) for k in range(4)]
-    boosts = [1.0, 1.0, 1.5, 1.0]
-    density = atlas.shared_density(all_charts, boosts, 500_000)
-    used = sum(atlas.texels(charts, density * boost) for charts, boost in zip(all_charts, boosts, strict=True))
-    assert 490_000 < used <= 500_000
+    densities = [np.full(6, wanted) for wanted in (100.0, 100.0, 150.0, 100.0)]
+
+    def used(scale: float) -> int:
+        pairs = zip(all_charts, densities, strict=True)
+        return sum(atlas.texels(charts, scale * density) for charts, density in pairs)
+
+    scale = atlas.shared_scale(all_charts, densities, 500_000, 1.5)
+    step = 2.0 ** (1.0 / atlas.SCALES_PER_OCTAVE)
+    assert used(scale) <= 500_000 < used(step * scale)
+    # With texels to spare no texture gets finer than its views can show.
+    assert 1.5 / step < atlas.shared_scale(all_charts, densities, 10**9, 1.5) <= 1.5
+
+
+def test_a_chart_is_as_fine_as_its_closest_views(atlas: ModuleType) -> None:
+    charts = atlas.make_charts(_quads(atlas, _box((3.0, 2.0, 1.0))), np.ones(6, bool))
+    chart_of_polygon = charts.chart.reshape(6, 4)[:, 0]
+    near, far = np.full(30, 400.0), np.full(70, 100.0)
+    seen = atlas.Seen(np.array([0] * 100 + [3] * 50), np.concatenate([near, far, np.full(50, 50.0)]))
+    wanted = atlas.wanted_density(charts, chart_of_polygon, seen, 7.0)
+    nearest = 2.0 ** (0.5 / atlas.LEVELS_PER_OCTAVE)
+    assert 400.0 / nearest <= wanted[chart_of_polygon[0]] <= 400.0 * nearest
+    assert 50.0 / nearest <= wanted[chart_of_polygon[3]] <= 50.0 * nearest
+    # Sides that no ray met are as coarse as the coarsest that one did meet; a thing that none met at all is coarser.
+    np.testing.assert_array_equal(wanted[chart_of_polygon[[1, 2, 4, 5]]], wanted[chart_of_polygon[3]])
+    nothing = atlas.Seen(np.zeros(0, int), np.zeros(0))
+    unseen = atlas.wanted_density(charts, chart_of_polygon, nothing, 7.0)
+    assert np.abs(np.log2(unseen / 7.0)).max() <= 0.5 / atlas.LEVELS_PER_OCTAVE
+
+
+def test_close_surfaces_are_told_from_far_ones() -> None:
+    """A camera looks down from 2 m at a small table, 1 m high, on a large floor."""
+    side = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+
+    def square(half_m: float, z_m: float) -> TriMesh:
+        return TriMesh(np.column_stack([half_m * side, np.full(4, z_m)]), faces)
+
+    things = tuple(
+        SceneObject(index, name, name, mesh, None, False, True)
+        for index, name, mesh in ((5, "floor", square(10.0, 0.0)), (9, "table", square(0.4, 1.0)))
+    )
+    room = Room("room", "kitchen", np.zeros((4, 2)), 2.5, things, (), None)
+    pose = np.diag([1.0, -1.0, -1.0, 1.0])[None].copy()
+    pose[0, 2, 3] = 2.0
+    closeness = measure_closeness(room, (CameraPath(0, pose, Intrinsics.centred(100, 100, np.pi / 2.0)),))
+    # The focal length is 50 pixels.
+    assert set(closeness.object_index) == {5, 9}
+    np.testing.assert_allclose(closeness.pixels_per_m[closeness.object_index == 9], 50.0, rtol=1e-4)
+    np.testing.assert_allclose(closeness.pixels_per_m[closeness.object_index == 5], 25.0, rtol=1e-4)
+    assert set(closeness.triangle[closeness.object_index == 9]) == {0, 1}
 
 
 def test_blur_ignores_texels_that_were_not_baked(atlas: ModuleType) -> None:
@@ -130,4 +180,4 @@ def test_the_budget_follows_the_work_ahead() -> None:
 def test_a_room_is_rendered_as_made_where_baking_does_not_pay(tmp_path: Path) -> None:
     blend = tmp_path / "room.blend"
     room = Room("room", "kitchen", np.zeros((4, 2)), 2.5, (), (), blend)
-    assert bake_room(room, RenderConfig(width_px=64, height_px=48, samples=4), 24, tmp_path) == blend
+    assert bake_room(room, (), RenderConfig(width_px=64, height_px=48, samples=4), 24, tmp_path) == blend
