@@ -55,6 +55,8 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--to", type=Path, required=True, metavar="DIR", help="folder of the results")
     parser.add_argument("--width", type=int, default=None, help="image width; costs: 192, else 512")
     parser.add_argument("--samples", type=int, default=None, help="costs: 16, look: 512, memory: 32")
+    parser.add_argument("--max-texels", type=int, default=None, help="render.max_texels of look, errors and memory")
+    parser.add_argument("--pair-samples", type=int, default=24, help="samples of the pairs to look at")
     parser.add_argument("--crop", type=int, default=64, help="side of the crops, pixels")
     return parser.parse_args()
 
@@ -115,7 +117,8 @@ def _baked(options: argparse.Namespace, scene: Scene) -> tuple[Path, RenderConfi
     """The room baked for a whole sequence of full-size images, and the settings of these."""
     config = _config(options, 512, 32)
     cameras = scene.at(config.width_px).cameras
-    budgeted = config.model_copy(update={"samples": 32})
+    texels = options.max_texels or config.max_texels
+    budgeted = config.model_copy(update={"samples": 32, "max_texels": texels})
     return bake_room(scene.room, cameras, budgeted, FRAMES * VIEWS, scene.folder / "baked"), config
 
 
@@ -124,11 +127,11 @@ def _look(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
     crops: list[Crop] = []
     for scene in scenes:
         baked, config = _baked(options, scene)
-        render_pair(scene, baked, config, 24, None)
+        render_pair(scene, baked, config, options.pair_samples, None)
         crops += compare_crops(scene, baked, config, options.crop, samples)
     values = [crop.ssim for crop in crops]
     return [
-        f"# Original shaders against baked: crops of {options.crop} px at {samples} samples",
+        f"# Original shaders against baked: crops of {options.crop} px of {config.width_px} px at {samples} samples",
         "",
         f"Median SSIM {statistics.median(values):.4f}, least {min(values):.4f}.",
         "",

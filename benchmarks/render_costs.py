@@ -62,9 +62,10 @@ def measure_costs(scene: Scene, config: RenderConfig) -> Costs:
     path = scene.folder / f"costs_{config.width_px}_{config.samples}.json"
     if stored := read_json(path):
         return Costs(**{**stored, "steps": {name: Step(**step) for name, step in stored["steps"].items()}})
-    scene = replace(scene.at(config.width_px, LONG), folder=scene.folder / f"costs_{config.width_px}")
     with spent_by_children() as baking:
-        baked = bake_room(scene.room, scene.cameras, config, FRAMES * VIEWS, scene.folder / "baked")
+        cameras = scene.at(config.width_px).cameras
+        baked = bake_room(scene.room, cameras, config, FRAMES * VIEWS, scene.folder / "baked")
+    scene = replace(scene.at(config.width_px, LONG), folder=scene.folder / f"costs_{config.width_px}")
     images = [Image("first", 1, 0, config.samples), Image("second", 2, 1, config.samples)]
     plain = run_loop(scene, Loop("plain", scene.as_made, False, "blender", True), images, config)
     kept = {

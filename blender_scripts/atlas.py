@@ -9,14 +9,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Free texels around each chart: baking extends the colours into them, so that filtering never meets a neighbour.
-BORDER_PX = 1
+# Free texels around each chart: baking extends the colours into them, so that filtering never meets a neighbour, not
+# even in an image of half the resolution.
+BORDER_PX = 2
+# A chart is stretched to this many texels along each side: the middle of one has to lie in it to be baked at all.
+MIN_CHART_PX = 4.0
 # A chart is cut in two while it fills less of its box than this, unless the box is small.
 MIN_FILL, MIN_SPLIT_M2, MAX_SPLITS = 0.35, 0.01, 8
 # A chart is as fine as this share of its views needs; the rest, from closer by, see it magnified.
 CLOSE_QUANTILE = 0.9
 # Densities, and the scale they share, are powers of two to the power of one over these.
 LEVELS_PER_OCTAVE, SCALES_PER_OCTAVE = 2, 4
+# Bumps are averaged over at most so many texels.
+MOST_BLUR_PX = 12.0
 # Below this scale nothing is left to save: each chart is its border.
 LEAST_SCALE = 1e-3
 
@@ -153,21 +158,30 @@ def connected_components(count: int, first: np.ndarray, second: np.ndarray) -> n
         label = lower
 
 
-def wanted_density(charts: Charts, chart_of_polygon: np.ndarray, seen: Seen, unseen_per_m: float) -> np.ndarray:
-    """Texels per metre f64[C] that each chart should have: about the pixels per metre of its closest views.
+@dataclass(frozen=True)
+class Density:
+    """Pixels per metre f64[C] with which each chart is seen: in its closest views, and in half of them."""
 
-    A chart that no ray met gets the least of its mesh's seen ones, as it may be a narrow side of them; a mesh that no
-    ray met gets ``unseen_per_m``: it shows in mirrors, and colours the light.
+    close: np.ndarray
+    typical: np.ndarray
+
+
+def seen_density(charts: Charts, chart_of_polygon: np.ndarray, seen: Seen, unseen_per_m: float) -> Density:
+    """How finely each chart is seen.
+
+    A chart that no ray met counts as the least of its mesh's seen ones, as it may be a narrow side of them; those of a
+    mesh that no ray met as ``unseen_per_m``: it shows in mirrors, and colours the light.
     """
-    density = np.full(len(charts.size_m), np.nan)
+    density = np.full((len(charts.size_m), 2), np.nan)
     chart = chart_of_polygon[seen.polygon]
     order = np.argsort(chart, kind="stable")
     for group in np.split(order, np.flatnonzero(np.diff(chart[order])) + 1):
         if len(group) and chart[group[0]] >= 0:
-            density[chart[group[0]]] = np.quantile(seen.pixels_per_m[group], CLOSE_QUANTILE)
-    met = ~np.isnan(density)
-    density[~met] = density[met].min() if met.any() else unseen_per_m
-    return quantised(density)
+            density[chart[group[0]]] = np.quantile(seen.pixels_per_m[group], (CLOSE_QUANTILE, 0.5))
+    met = ~np.isnan(density[:, 0])
+    density[~met] = density[met].min(axis=0) if met.any() else unseen_per_m
+    density = quantised(density)
+    return Density(density[:, 0], density[:, 1])
 
 
 def quantised(density: np.ndarray) -> np.ndarray:
@@ -193,7 +207,18 @@ def pack(charts: Charts, texels_per_m: np.ndarray) -> Packing:
 
 
 def _size_px(charts: Charts, texels_per_m: np.ndarray) -> np.ndarray:
-    return np.ceil(charts.size_m * texels_per_m[:, None]).astype(np.int64) + 2 * BORDER_PX
+    return np.ceil(_chart_px(charts, texels_per_m)).astype(np.int64) + 2 * BORDER_PX
+
+
+def _chart_px(charts: Charts, texels_per_m: np.ndarray) -> np.ndarray:
+    """Sides f64[C, 2] of the charts, without their borders."""
+    return np.maximum(charts.size_m * texels_per_m[:, None], MIN_CHART_PX)
+
+
+def boxes(charts: Charts, packing: Packing, texels_per_m: np.ndarray) -> np.ndarray:
+    """Left, bottom, right and top i64[C, 4] of the packed charts, with their borders; the last two exclusive."""
+    begin = packing.corner_px.astype(np.int64)
+    return np.concatenate([begin, begin + _size_px(charts, texels_per_m)], axis=1)
 
 
 def texels(charts: Charts, texels_per_m: np.ndarray) -> int:
@@ -212,7 +237,24 @@ def shared_scale(all_charts: list[Charts], densities: list[np.ndarray], budget: 
         steps -= 1
 
 
-def blur(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+def blur_charts(values: np.ndarray, known: np.ndarray, boxes: np.ndarray, width: np.ndarray) -> None:
+    """Averages ``values`` f[H, W, K] in place, over the ``known`` bool[H, W] texels of each chart alone.
+
+    ``boxes`` i[C, 4] holds left, bottom, right and top of the charts with their borders; ``width`` f[C] over how many
+    texels each is averaged.
+    """
+    for (left, bottom, right, top), passes in zip(boxes, _passes(width), strict=True):
+        part = (slice(bottom, top), slice(left, right))
+        for _ in range(passes):
+            values[part] = np.where(known[part][..., None], _blur(values[part], known[part]), values[part])
+
+
+def _passes(width: np.ndarray) -> np.ndarray:
+    """How often weights 1-2-1 (a variance of 1/2) make a box so wide (a variance of its square over 12)."""
+    return np.round(np.minimum(width, MOST_BLUR_PX) ** 2 / 6.0).astype(int)
+
+
+def _blur(values: np.ndarray, known: np.ndarray) -> np.ndarray:
     """``values`` f[H, W, K] smoothed with weights 1-2-1 along both sides, over the ``known`` bool[H, W] texels."""
     weight = known.astype(np.float32)[..., None]
     total = values * weight
@@ -232,6 +274,6 @@ def uv(charts: Charts, packing: Packing, texels_per_m: np.ndarray) -> np.ndarray
     """UV f32[L, 2] of every corner; corners without a chart lie outside the image."""
     size_px = np.array([packing.width_px, packing.height_px])
     begin_px = np.append(packing.corner_px, [[0.0, 0.0]], axis=0)[charts.chart]
-    corner_per_m = np.append(texels_per_m, 0.0)[charts.chart]
-    inside = (begin_px + BORDER_PX + charts.plane_m * corner_per_m[:, None]) / size_px
+    px_per_m = _chart_px(charts, texels_per_m) / np.maximum(charts.size_m, 1e-9)
+    inside = (begin_px + BORDER_PX + charts.plane_m * np.append(px_per_m, [[0.0, 0.0]], axis=0)[charts.chart]) / size_px
     return np.where(charts.chart[:, None] >= 0, inside, -2.0).astype(np.float32)

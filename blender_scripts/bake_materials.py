@@ -27,6 +27,11 @@ from shader_channels import COLOR, GLOSS, NORMAL, SURFACE, ChannelReader, consta
 from worker_link import Worker, read_job
 
 MARGIN_PX = 3
+# Points of a texel that are evaluated and averaged: a joint between boards that is finer than a texel would otherwise
+# be there or not by chance.
+SAMPLES = {COLOR: 4, SURFACE: 2, GLOSS: 1, NORMAL: 4}
+# Only colours need every texel; the others have half as many along each side.
+COARSER = {COLOR: 1, SURFACE: 2, GLOSS: 2, NORMAL: 2}
 
 
 class Baker:
@@ -102,14 +107,15 @@ class Baker:
         """One image of one mesh."""
         image = bpy.data.images.new(
             f"{work.thing.data.name}_{channel}",
-            packing.width_px,
-            packing.height_px,
+            -(-packing.width_px // COARSER[channel]),
+            -(-packing.height_px // COARSER[channel]),
             alpha=False,
             float_buffer=channel == NORMAL,
         )
         image.colorspace_settings.name = "sRGB" if channel == COLOR else "Non-Color"
         for material in [*materials, self._blank]:
             self._aim(material, channel, image)
+        bpy.context.scene.cycles.samples = SAMPLES[channel]
         bpy.ops.object.bake(
             type="NORMAL" if channel == NORMAL else "EMIT",
             normal_space="OBJECT",
@@ -120,7 +126,7 @@ class Baker:
             uv_layer=BAKED_UV,
         )
         if channel == NORMAL:
-            soften(image)
+            soften(image, work, packing)
         self._files.store(work, channel, image)
         bpy.data.images.remove(image)
 
@@ -157,18 +163,19 @@ def bumps() -> dict[str, bpy.types.NodeSocket]:
     return found
 
 
-def soften(image: bpy.types.Image) -> None:
-    """Averages baked normals over neighbouring texels.
+def soften(image: bpy.types.Image, work: Work, packing: atlas.Packing) -> None:
+    """Averages baked normals over as many texels as a pixel of a typical view spans.
 
-    A normal is baked at one point of a texel. Where bumps are finer than texels, that is noise, which would turn a
-    polished floor into sandpaper; rendering the bumps themselves averages over a pixel likewise.
+    Cycles takes a bump's slope over a pixel: seen from afar, fine bumps are flat. Unless baked ones are averaged
+    likewise, they turn a polished floor into sandpaper.
     """
     width, height = image.size
     pixels = np.empty(4 * width * height, np.float32)
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(height, width, 4)
     baked = (pixels[..., :3] != 0.0).any(axis=-1)
-    pixels[..., :3] = np.where(baked[..., None], atlas.blur(pixels[..., :3], baked), pixels[..., :3])
+    boxes = atlas.boxes(work.charts, packing, work.texels_per_m) // COARSER[NORMAL]
+    atlas.blur_charts(pixels[..., :3], baked, boxes, work.texels_per_pixel / COARSER[NORMAL])
     image.pixels.foreach_set(pixels.ravel())
     image.update()
 
@@ -183,12 +190,11 @@ def isolate(things: list[bpy.types.Object]) -> dict[bpy.types.Object, bool]:
 
 
 def configure() -> None:
-    """One sample per texel, on the CPU."""
+    """All samples of each texel, on the CPU."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.use_persistent_data = False
     scene.cycles.device = "CPU"
-    scene.cycles.samples = 1
     scene.cycles.use_denoising = False
     scene.cycles.use_adaptive_sampling = False
 

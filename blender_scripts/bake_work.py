@@ -29,19 +29,24 @@ LAMPS = frozenset({"EMISSION"})
 # What a mesh that no ray met gets, as a share of the median of what was met.
 UNSEEN_SHARE = 0.25
 # Finer than this share of a pixel of the closest views, texels show nothing more.
-MOST_TEXELS_PER_PIXEL = 1.5
+MOST_TEXELS_PER_PIXEL = 1.0
 # What packing leaves of an image for charts, about.
 PACKED_SHARE = 0.87
 
 
 @dataclass(frozen=True)
 class Work:
-    """One mesh to bake, on one of the objects that show it; ``texels_per_m`` f64[C] of its charts."""
+    """One mesh to bake, on one of the objects that show it.
+
+    ``texels_per_m`` f64[C] is the density of its charts; ``texels_per_pixel`` f64[C] how many texels a pixel of a
+    typical view spans.
+    """
 
     thing: bpy.types.Object
     slots: frozenset[int]
     charts: atlas.Charts
     texels_per_m: np.ndarray
+    texels_per_pixel: np.ndarray
 
     @property
     def materials(self) -> list[bpy.types.Material]:
@@ -54,13 +59,15 @@ def collect(closeness: dict[str, np.ndarray], max_texels: int) -> list[Work]:
 
     ``closeness`` holds ``object_index``, ``triangle`` and ``pixels_per_m`` of what cameras met.
     """
-    users = _users()
     unseen_per_m = UNSEEN_SHARE * float(np.median(closeness["pixels_per_m"])) if len(closeness["triangle"]) else 1.0
-    wanted = [_plan(things, slots, closeness, unseen_per_m) for things, slots in users]
-    wanted = [work for work in wanted if len(work.charts.size_m)]
-    charts, densities = [work.charts for work in wanted], [work.texels_per_m for work in wanted]
-    scale = atlas.shared_scale(charts, densities, round(PACKED_SHARE * max_texels), MOST_TEXELS_PER_PIXEL)
-    return [Work(work.thing, work.slots, work.charts, scale * work.texels_per_m) for work in wanted]
+    plans = [(things[0], slots, *_plan(things, slots, closeness, unseen_per_m)) for things, slots in _users()]
+    plans = [plan for plan in plans if len(plan[2].size_m)]
+    charts, close = [plan[2] for plan in plans], [plan[3].close for plan in plans]
+    scale = atlas.shared_scale(charts, close, round(PACKED_SHARE * max_texels), MOST_TEXELS_PER_PIXEL)
+    return [
+        Work(thing, slots, charts, scale * density.close, scale * density.close / density.typical)
+        for thing, slots, charts, density in plans
+    ]
 
 
 def _users() -> list[tuple[list[bpy.types.Object], frozenset[int]]]:
@@ -88,7 +95,8 @@ def _is_bakeable(material: bpy.types.Material | None) -> bool:
 
 def _plan(
     things: list[bpy.types.Object], slots: frozenset[int], closeness: dict[str, np.ndarray], unseen_per_m: float
-) -> Work:
+) -> tuple[atlas.Charts, atlas.Density]:
+    """The charts of a mesh, and how finely they are seen."""
     thing = things[0]
     mesh = thing.data
     faces, wanted = _read_faces(thing, slots)
@@ -101,7 +109,7 @@ def _plan(
     met = np.isin(closeness["object_index"], [other.pass_index for other in things])
     met &= closeness["triangle"] < len(polygon)
     seen = atlas.Seen(polygon[closeness["triangle"][met]], closeness["pixels_per_m"][met])
-    return Work(thing, slots, charts, atlas.wanted_density(charts, chart_of_polygon, seen, unseen_per_m))
+    return charts, atlas.seen_density(charts, chart_of_polygon, seen, unseen_per_m)
 
 
 def _read_faces(thing: bpy.types.Object, slots: frozenset[int]) -> tuple[atlas.Faces, np.ndarray]:
