@@ -46,20 +46,16 @@ class PlainLoop:
         arrays = JobArrays(source.parent)
         load_room(settings["room"], job["blend_path"], arrays)
         self._actors = add_actors(settings["actors"], arrays)
-        self._cameras = {
-            camera["camera"]: (
-                opencv_cameras.add_camera(f"camera_{camera['camera']}", None),
-                camera["intrinsics"],
-                arrays.load(camera["world_from_camera"]),
-            )
-            for camera in settings["cameras"]
+        self._camera = opencv_cameras.add_camera("camera")
+        self._views = {
+            view["camera"]: (view["intrinsics"], arrays.load(view["world_from_camera"])) for view in settings["cameras"]
         }
         self._configure(settings)
 
     def _configure(self, settings: dict) -> None:
         scene = bpy.context.scene
         if self._job["sampling"] == "ours":
-            cycles_settings.configure(settings["settings"], settings["threads"])
+            cycles_settings.configure(scene, "cpu", settings["settings"])
         else:
             scene.render.engine = "CYCLES"
             scene.cycles.device = "CPU"
@@ -80,7 +76,7 @@ class PlainLoop:
         if exposure_ev is None:
             image = self._job["images"][0]
             self._aim(image["frame"], image["camera"])
-            exposure_ev = auto_exposure.exposure_ev(auto_exposure.TestRender(self._folder).pixels())
+            exposure_ev = auto_exposure.exposure_ev(auto_exposure.TestRender(bpy.context.scene, self._folder).pixels())
         bpy.context.scene.view_settings.exposure = exposure_ev
         self._worker.emit("exposure", exposure_ev=exposure_ev)
 
@@ -103,9 +99,9 @@ class PlainLoop:
         self._worker.emit("image", stem=image["stem"], cpu_s=cpu_s, wall_s=wall_s)
 
     def _aim(self, frame: int, camera: int) -> None:
-        thing, intrinsics, world_from_camera = self._cameras[camera]
-        opencv_cameras.set_intrinsics(thing, intrinsics)
-        opencv_cameras.place(thing, np.asarray(world_from_camera[frame]))
+        intrinsics, world_from_camera = self._views[camera]
+        opencv_cameras.set_intrinsics(bpy.context.scene, self._camera, intrinsics)
+        opencv_cameras.place(self._camera, np.asarray(world_from_camera[frame]))
 
 
 def use_blenders_sampling(cycles: bpy.types.bpy_struct) -> None:
