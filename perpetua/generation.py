@@ -20,11 +20,13 @@ from perpetua.formats.reader import read_sequence
 from perpetua.pictures.contact_sheet import write_contact_sheet
 from perpetua.pipeline.cost import Cost, check_disk, estimate_cost, gigabytes
 from perpetua.pipeline.events import OnEvent
+from perpetua.pipeline.free_memory import free_memory_mb
 from perpetua.pipeline.layout import LOG_FILE, OutputLayout, open_run
 from perpetua.pipeline.lease import hold
 from perpetua.pipeline.progress import Progress
 from perpetua.pipeline.runner import RoomRun
 from perpetua.pipeline.stages import STAGE_NAMES, STAGES
+from perpetua.rendering.devices import auto_workers
 from perpetua.rooms.build import check_source
 from perpetua.system_libraries import require_libraries
 
@@ -33,7 +35,7 @@ EXIT_INTERRUPTED = 130
 
 @dataclass(frozen=True)
 class GenerateRequest:
-    """What the user asked for."""
+    """What the user asked for. ``workers`` 0: as many as suit this machine."""
 
     config: Config
     seed: int
@@ -65,11 +67,15 @@ def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> i
         return 0
     open_run(request.out, request.seed, request.rooms, request.config, request.replace)
     work = RoomWork(partial(make_room, request, until), partial(room_folder, request), cost.room_memory_mb)
+    workers = request.workers
+    if workers == 0:
+        workers = auto_workers(len(request.rooms), request.device, free_memory_mb(), cost.room_memory_mb)
+        say(f"rooms made at a time on this machine: {workers}")
     logging.getLogger("perpetua").setLevel(logging.INFO)
     raise_on_sigterm()
     try:
         with Progress(request.out / LOG_FILE, len(request.rooms), request.config.cameras.count, console) as progress:
-            failures = run_rooms(request.rooms, request.workers, work, progress.show)
+            failures = run_rooms(request.rooms, workers, work, progress.show)
     except KeyboardInterrupt:
         say(f"stopped; what is done is kept. To go on, run the same command again:\n  {_this_command()}")
         return EXIT_INTERRUPTED

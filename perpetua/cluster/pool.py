@@ -23,6 +23,7 @@ from perpetua.pipeline.events import Event, OnEvent
 from perpetua.pipeline.free_memory import free_memory_mb
 from perpetua.pipeline.lease import LeaseWatch
 from perpetua.pipeline.memory import tree_memory_mb
+from perpetua.rendering.devices import share_machine
 
 PR_SET_PDEATHSIG = 1
 LOOK_EVERY_S = 1.0
@@ -32,10 +33,11 @@ RECYCLED_ABOVE_MB = 1500.0
 
 @dataclass
 class Worker:
-    """A process and what it is at. ``room`` is None while it waits."""
+    """A process and what it is at. ``room`` is None while it waits; ``place`` numbers the pool's workers from 0."""
 
     process: BaseProcess
     connection: Connection
+    place: int
     room: int | None = None
 
     def memory_mb(self) -> float:
@@ -98,7 +100,8 @@ class Pool:
         while self._waiting and len(self._busy()) < self.size and self._may_start(self._waiting[0]):
             worker = next((worker for worker in self._workers if worker.room is None), None)
             if worker is None:
-                worker = _start_worker(self.work)
+                place = min(set(range(self.size)) - {worker.place for worker in self._workers})
+                worker = _start_worker(self.work, place, self.size)
                 self._workers.append(worker)
             worker.room = self._waiting.popleft()
             try:
@@ -194,18 +197,19 @@ def _name_end(exit_code: int | None) -> str:
     return f"exit code {exit_code}"
 
 
-def _start_worker(work: RoomWork) -> Worker:
+def _start_worker(work: RoomWork, place: int, size: int) -> Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    process = context.Process(target=_work_until_closed, args=(theirs, work, os.getpid()), daemon=True)
+    process = context.Process(target=_work_until_closed, args=(theirs, work, os.getpid(), place, size), daemon=True)
     process.start()
     # Ours alone is open now, so that a worker's end is seen as the end of what it says.
     theirs.close()
-    return Worker(process, ours)
+    return Worker(process, ours, place)
 
 
-def _work_until_closed(connection: Connection, work: RoomWork, parent: int) -> None:
+def _work_until_closed(connection: Connection, work: RoomWork, parent: int, place: int, size: int) -> None:
     """A worker's life."""
+    share_machine(place, size)
     logging.getLogger("perpetua").setLevel(logging.INFO)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

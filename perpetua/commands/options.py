@@ -16,6 +16,28 @@ OUT_OPTION = click.option(
 )  # fmt: skip
 
 
+class WorkerCount(click.ParamType):
+    """A number from 1, or "auto", which is handed on as 0."""
+
+    name = "integer|auto"
+
+    def convert(self, value: str | int, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number.
+
+        Raises:
+            BadParameter: it is neither.
+        """
+        if value == "auto":
+            return 0
+        try:
+            count = int(value)
+        except ValueError:
+            count = 0
+        if count < 1:
+            self.fail(f"must be a number from 1, or auto, not '{value}'", param, ctx)
+        return count
+
+
 def wide_console() -> Console:
     """As wide as the terminal; in a pipe or file wide enough for a table's lines to stay whole."""
     console = Console()

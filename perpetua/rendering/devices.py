@@ -1,11 +1,16 @@
 """What Cycles may render on, and how the processes of one machine share its GPUs and CPU threads."""
 
 import os
+import shutil
+import subprocess
 from dataclasses import dataclass
 
 DEVICES = ("auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal")
 # Set in each process that works on rooms beside others: its number and how many they are, as "1/4".
 SHARE_VARIABLE = "PERPETUA_WORKER"
+# Cores for each worker on the CPU. While Blender loads a frame into Cycles one core works and its others wait, so few
+# cores each waste least; every worker holds a room of its own in memory, so not each core gets one.
+CORES_PER_WORKER = 2
 
 
 @dataclass(frozen=True)
@@ -40,3 +45,29 @@ def usable_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def auto_workers(rooms: int, device: str, free_mb: float, room_mb: float) -> int:
+    """How many rooms to make at a time: one per GPU, or one per ``CORES_PER_WORKER`` cores; what memory holds.
+
+    Args:
+        rooms: how many are asked for.
+        device: one of ``DEVICES``.
+        free_mb: memory that is free, megabytes.
+        room_mb: memory that one room may need, megabytes.
+    """
+    gpus = nvidia_gpus() if device in ("auto", "cuda", "optix") else 0
+    places = gpus or usable_cores() // CORES_PER_WORKER
+    return max(1, min(rooms, places, int(free_mb // room_mb)))
+
+
+def nvidia_gpus() -> int:
+    """How many GPUs NVIDIA's driver lists; 0 without that driver."""
+    program = shutil.which("nvidia-smi")
+    if program is None:
+        return 0
+    try:
+        listed = subprocess.run([program, "-L"], capture_output=True, text=True, timeout=30.0, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return 0
+    return sum(line.startswith("GPU ") for line in listed.stdout.splitlines()) if listed.returncode == 0 else 0

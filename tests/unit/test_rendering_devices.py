@@ -4,11 +4,14 @@ import importlib
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import ModuleType
 
+import click
 import pytest
 
 from perpetua.blender import SCRIPT_FOLDER
+from perpetua.commands.options import WorkerCount
 from perpetua.rendering import devices
 
 
@@ -121,3 +124,49 @@ def test_threads_are_shared_among_workers_unless_set(monkeypatch: pytest.MonkeyP
     assert devices.cpu_threads(0, devices.MachineShare(1, 3)) == 2
     assert devices.cpu_threads(0, devices.MachineShare(5, 20)) == 1
     assert devices.cpu_threads(3, devices.MachineShare(5, 20)) == 3
+
+
+@pytest.mark.parametrize(
+    ("rooms", "device", "gpus", "cores", "free_mb", "expected"),
+    [
+        (100, "cpu", 4, 16, 1e6, 8),
+        (100, "auto", 4, 16, 1e6, 4),
+        (100, "auto", 0, 16, 1e6, 8),
+        (100, "hip", 4, 16, 1e6, 8),
+        (3, "auto", 0, 16, 1e6, 3),
+        (100, "cpu", 0, 16, 7000.0, 3),
+        (100, "cpu", 0, 1, 500.0, 1),
+    ],
+)
+def test_workers_follow_gpus_cores_and_memory(
+    monkeypatch: pytest.MonkeyPatch, rooms: int, device: str, gpus: int, cores: int, free_mb: float, expected: int
+) -> None:
+    monkeypatch.setattr(devices, "nvidia_gpus", lambda: gpus)
+    monkeypatch.setattr(devices, "usable_cores", lambda: cores)
+    assert devices.auto_workers(rooms, device, free_mb, 2000.0) == expected
+
+
+@pytest.mark.parametrize(
+    ("script", "expected"), [("echo 'GPU 0: A'; echo 'GPU 1: B'", 2), ("echo no devices; exit 9", 0)]
+)
+def test_gpus_are_counted_as_the_driver_lists_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, expected: int
+) -> None:
+    program = tmp_path / "nvidia-smi"
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    assert devices.nvidia_gpus() == expected
+    monkeypatch.setenv("PATH", "")
+    assert devices.nvidia_gpus() == 0
+
+
+@pytest.mark.parametrize(("text", "expected"), [("1", 1), ("12", 12), ("auto", 0)])
+def test_workers_are_a_number_or_auto(text: str, expected: int) -> None:
+    assert WorkerCount().convert(text, None, None) == expected
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "two", "1.5"])
+def test_other_workers_are_refused(text: str) -> None:
+    with pytest.raises(click.BadParameter, match="number from 1, or auto"):
+        WorkerCount().convert(text, None, None)
