@@ -23,7 +23,7 @@ from perpetua.config import load_config
 @click.option("--set", "assignments", metavar="KEY=VALUE", multiple=True,
               help="Change one setting, for example --set sequence.frames=48. Can be given several times.")  # fmt: skip
 @click.option("--workers", type=WorkerCount(), default=1, show_default=True,
-              help="Rooms made at a time; auto: one per GPU, or per two cores, as memory allows.")  # fmt: skip
+              help="Rooms made at a time; auto: one per GPU, or per four cores, as memory allows.")  # fmt: skip
 @DEVICE_OPTION
 @click.option("--replace", is_flag=True, help="Allow other settings than the ones the output folder was made with.")
 @click.option("--dry-run", is_flag=True, help="Say what would be done and what it costs, and do nothing.")

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 DEVICES = ("auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal")
 # Set in each process that works on rooms beside others: its number and how many they are, as "1/4".
 SHARE_VARIABLE = "PERPETUA_WORKER"
-# Cores for each worker on the CPU. While Blender loads a frame into Cycles one core works and its others wait, so few
-# cores each waste least; every worker holds a room of its own in memory, so not each core gets one.
-CORES_PER_WORKER = 2
+# Cores for each worker on the CPU. Of a frame's CPU time 1.3% is one core's work alone while the others wait
+# (benchmarks/render_worker.py overhead, four views at 192 px and 24 samples): four cores lose 4% to that, sixteen 16%.
+# Every worker holds a room of its own in memory, so not each core gets one.
+CORES_PER_WORKER = 4
 
 
 @dataclass(frozen=True)

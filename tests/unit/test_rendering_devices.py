@@ -129,10 +129,10 @@ def test_threads_are_shared_among_workers_unless_set(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize(
     ("rooms", "device", "gpus", "cores", "free_mb", "expected"),
     [
-        (100, "cpu", 4, 16, 1e6, 8),
-        (100, "auto", 4, 16, 1e6, 4),
-        (100, "auto", 0, 16, 1e6, 8),
-        (100, "hip", 4, 16, 1e6, 8),
+        (100, "cpu", 4, 16, 1e6, 4),
+        (100, "auto", 3, 16, 1e6, 3),
+        (100, "auto", 0, 18, 1e6, 4),
+        (100, "hip", 3, 16, 1e6, 4),
         (3, "auto", 0, 16, 1e6, 3),
         (100, "cpu", 0, 16, 7000.0, 3),
         (100, "cpu", 0, 1, 500.0, 1),
