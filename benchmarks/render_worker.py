@@ -53,11 +53,12 @@ class Scene:
     cameras: tuple[CameraPath, ...]
 
     def cut(self, frames: int, views: int) -> "Scene":
-        """The first frames and views."""
+        """The first frames and views; a sequence that is shorter starts again."""
+        chosen = np.arange(frames) % len(self.cameras[0].world_from_camera)
         return Scene(
             self.room,
-            tuple(replace(actor, vertices_m=actor.vertices_m[:frames]) for actor in self.actors),
-            tuple(replace(one, world_from_camera=one.world_from_camera[:frames]) for one in self.cameras[:views]),
+            tuple(replace(actor, vertices_m=actor.vertices_m[chosen]) for actor in self.actors),
+            tuple(replace(one, world_from_camera=one.world_from_camera[chosen]) for one in self.cameras[:views]),
         )
 
 
@@ -216,7 +217,10 @@ def threads(scene: Scene, config: RenderConfig, given: argparse.Namespace) -> No
 
 
 def kills(scene: Scene, config: RenderConfig, given: argparse.Namespace) -> None:
-    """Kills Blender ten times at random moments of one job; the result must be the undisturbed one bit for bit."""
+    """Kills Blender ten times at random moments of one job; the result must be the undisturbed one bit for bit.
+
+    ``--frames`` above 10: each kill but the last falls into the time of another frame.
+    """
     scene = scene.cut(given.frames, 4)
     calm = _render(scene, config, given.scratch / "calm", iter(()))
     draw = random.Random(7)
