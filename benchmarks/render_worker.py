@@ -114,11 +114,11 @@ class Moment:
     text: str
 
 
-def watch_worker(scene: Scene, config: RenderConfig, folder: Path) -> tuple[list[Moment], float]:
+def watch_worker(scene: Scene, config: RenderConfig, folder: Path, device: str = "cpu") -> tuple[list[Moment], float]:
     """Runs the worker on a whole job: every line it writes, with time stamps, and its peak memory in MB."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    job = write_job(folder, scene.room, scene.actors, scene.cameras, config, "cpu", {})
+    job = write_job(folder, scene.room, scene.actors, scene.cameras, config, device, {})
     write_json(folder / PENDING_FILE, {"frames": list(range(len(scene.cameras[0].world_from_camera)))})
     pipe = subprocess.PIPE
     command, environment = script_command(RENDER_SCRIPT, job, None), script_environment(folder)
@@ -144,7 +144,7 @@ def _peak_mb(pid: int) -> float:
     return int(found[1]) / 1024.0 if found else 0.0
 
 
-def _kind(text: str) -> str:
+def phase_of(text: str) -> str:
     """What Blender does after it wrote a line."""
     rules = (
         (r"\| Sample \d+/\d+", "sampling, denoising"),
@@ -162,7 +162,7 @@ def overhead(scene: Scene, config: RenderConfig, given: argparse.Namespace) -> N
     start_s = moments[ready].cpu_s
     spent: dict[str, float] = defaultdict(float)
     for one, following in zip(moments[ready:], moments[ready + 1 :], strict=False):
-        spent[_kind(one.text)] += following.cpu_s - one.cpu_s
+        spent[phase_of(one.text)] += following.cpu_s - one.cpu_s
     frame_s = sum(spent.values()) / given.frames
     print(f"load {os.getloadavg()[0]:.1f}; {config.width_px} px, {config.samples} samples, 4 views a frame")
     for name, seconds in sorted(spent.items(), key=lambda item: -item[1]):
