@@ -23,7 +23,6 @@ geometry the world tracks are also scored after the similarity transform that br
 Nothing in a file is ever run: no array may need pickle, and types and sizes are checked before anything is read.
 """
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,6 +31,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int64
 
 from perpetua.errors import InputError
+from perpetua.npz import ArchiveError, open_npz
 
 CAMERA, WORLD, VISIBILITY, INDEX = "tracks_xyz_camera", "tracks_xyz_world", "visibility", "track_index"
 GEOMETRY_PIXELS, GEOMETRY = "geometry_pixels_xytv", "geometry_xyz_world"
@@ -109,42 +109,24 @@ def read_predictions(path: Path, size: SequenceSize) -> Predictions:
 
 def _read_arrays(path: Path, size: SequenceSize) -> dict[str, np.ndarray]:
     try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.infolist()
-            names = [member.filename.removesuffix(".npy") for member in members]
-            if len(set(names)) < len(names) or not set(names) <= set(KINDS):
+        with open_npz(path, _most_bytes(size)) as file:
+            if len(set(file.names)) < len(file.names) or not set(file.names) <= set(KINDS):
                 known = ", ".join(KINDS)
-                raise InputError(f"'{path}' may hold {known}, each once, and holds {', '.join(names)}: {EXAMPLE}")
-            shapes = {name: _checked_shape(archive, member, name) for name, member in zip(names, members, strict=True)}
-            _check_shapes(path, shapes, size)
-            arrays = {}
-            for name, member in zip(names, members, strict=True):
-                with archive.open(member) as handle:
-                    arrays[name] = np.lib.format.read_array(handle, allow_pickle=False)
-            return arrays
-    except InputError:
-        raise
-    except Exception as error:  # a hostile file can raise anything
+                raise InputError(f"'{path}' may hold {known}, each once, and holds {', '.join(file.names)}: {EXAMPLE}")
+            headers = {name: file.header(name) for name in file.names}
+            for name, header in headers.items():
+                if header.dtype.kind not in KINDS[name] or header.dtype.itemsize > 8:
+                    kind = KIND_NAMES[KINDS[name]]
+                    raise InputError(f"'{path}': '{name}' must be {kind} of at most 64 bits, not {header.dtype}")
+            _check_shapes(path, {name: header.shape for name, header in headers.items()}, size)
+            return {name: file.read(name) for name in file.names}
+    except ArchiveError as error:
         raise InputError(f"cannot read predictions from '{path}': {error}: {EXAMPLE}") from None
 
 
-def _checked_shape(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> tuple[int, ...]:
-    """The shape in an array's header, if type and length of the data are what the header promises."""
-    with archive.open(member) as handle:
-        version = np.lib.format.read_magic(handle)
-        read_header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-        if version not in read_header:
-            raise ValueError(f"'{name}' is of .npy version {version}; (1, 0) or (2, 0) is required")
-        shape, _, dtype = read_header[version](handle)
-        header_bytes = handle.tell()
-    if dtype.kind not in KINDS[name] or dtype.itemsize > 8:
-        raise ValueError(f"'{name}' must be {KIND_NAMES[KINDS[name]]} of at most 64 bits, not {dtype}")
-    length = 1
-    for side in shape:
-        length *= int(side)
-    if member.file_size != header_bytes + length * dtype.itemsize:
-        raise ValueError(f"'{name}' is {shape} {dtype} by its header, and its data have another length")
-    return tuple(int(side) for side in shape)
+def _most_bytes(size: SequenceSize) -> int:
+    """What the largest array may hold: positions in every view, or geometry, with a header."""
+    return 2**16 + 8 * max(3 * size.views * size.frames * size.tracks, 4 * MOST_GEOMETRY)
 
 
 def _check_shapes(path: Path, shapes: dict[str, tuple[int, ...]], size: SequenceSize) -> None:

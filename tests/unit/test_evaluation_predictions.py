@@ -85,7 +85,7 @@ FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "positions as integers": ({**_arrays(), "tracks_xyz_world": np.zeros((3, 5, 3), int)}, "must be floating point"),
     "complex positions": ({**_arrays(), "tracks_xyz_world": np.zeros((3, 5, 3), complex)}, "must be floating point"),
     "long doubles": ({**_arrays(), "tracks_xyz_world": np.zeros((3, 5, 3), np.longdouble)}, "at most 64 bits"),
-    "objects": ({**_arrays(), "tracks_xyz_world": np.full((3, 5, 3), None)}, "must be floating point"),
+    "objects": ({**_arrays(), "tracks_xyz_world": np.full((3, 5, 3), None)}, "never pickled objects"),
     "one visibility for views": ({**_arrays(), "visibility": np.ones((3, 5), bool)}, "for each view"),
     "track out of range": ({**_arrays(2), "track_index": np.array([0, 5])}, r"must lie in 0\.\.4"),
     "negative track": ({**_arrays(2), "track_index": np.array([-1, 2])}, r"must lie in 0\.\.4"),

@@ -5,7 +5,6 @@ They are opened without pickle, so that nothing in them is run: the package's ow
 Tensors do not leave this module.
 """
 
-import zipfile
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -15,6 +14,7 @@ from jaxtyping import Float32, Float64, Int32
 
 from perpetua.actors.types import BODY_JOINTS, BODY_PARENTS, BodyMotion
 from perpetua.errors import AssetError
+from perpetua.npz import ArchiveError, NpzFile, open_npz
 
 VERTEX_COUNT, FACE_COUNT, JOINT_COUNT = 10475, 20908, 55
 LEFT_EYE, RIGHT_EYE = 23, 24
@@ -48,17 +48,16 @@ class SmplxModel:
     uv_faces: Int32[np.ndarray, "20908 3"] | None
 
 
-def _array(path: Path, file: np.lib.npyio.NpzFile, key: str) -> np.ndarray:
+def _array(path: Path, file: NpzFile, key: str) -> np.ndarray:
     if key not in file:
         raise AssetError(f"SMPL-X model file '{path}' must hold the array '{key}': download the file again")
     try:
-        array = file[key]
-    except (ValueError, zipfile.BadZipFile, OSError) as error:
+        return file.read(key)
+    except ArchiveError as error:
         raise AssetError(
             f"SMPL-X model file '{path}' must hold '{key}' as a plain array of numbers, which opens without pickle: "
             f"{error}; download the file again"
         ) from None
-    return np.asarray(array)
 
 
 def _shaped(path: Path, key: str, array: np.ndarray, shape: tuple[int | None, ...]) -> np.ndarray:
@@ -110,20 +109,16 @@ def load_model(path: Path, betas: int) -> SmplxModel:
         AssetError: the file is missing, is not SMPL-X's, needs pickle to be opened, or has too few directions.
     """
     try:
-        # Given as a stream, the file is closed whatever is wrong with it.
-        with path.open("rb") as stream:
-            opened = np.load(stream, allow_pickle=False)
-            if not isinstance(opened, np.lib.npyio.NpzFile):
-                raise AssetError(f"SMPL-X model file '{path}' must be an .npz archive: download it again")
-            return _read(path, opened, betas)
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
+        with open_npz(path) as file:
+            return _read(path, file, betas)
+    except ArchiveError as error:
         raise AssetError(
             f"SMPL-X model file '{path}' must be an .npz file that opens without pickle: {error}; get it from "
             "https://smpl-x.is.tue.mpg.de and set actors.smplx.folder to its folder"
         ) from None
 
 
-def _read(path: Path, file: np.lib.npyio.NpzFile, betas: int) -> SmplxModel:
+def _read(path: Path, file: NpzFile, betas: int) -> SmplxModel:
     shapes = _shaped(path, "shapedirs", _array(path, file, "shapedirs"), (VERTEX_COUNT, 3, None))
     _check_betas(path, shapes.shape[2], betas)
     _check_tree(path, _array(path, file, "kintree_table"))

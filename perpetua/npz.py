@@ -1,0 +1,127 @@
+"""Reads ``.npz`` files that nobody vouches for: nothing in them is run, and nothing unpacks to more than it may.
+
+The one place where such a file is opened. An array's header is believed only where the member's length is what the
+header promises; what is unpacked is cut off at that length, whatever the archive's directory says.
+"""
+
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from perpetua.errors import InputError
+
+MOST_BYTES = 256 * 2**20
+# An .npz file of a data set holds a handful of arrays; a directory of millions is meant to hurt.
+MOST_MEMBERS = 1024
+_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+_PLAIN = "biufcUS"
+
+
+class ArchiveError(InputError):
+    """A file is no ``.npz`` archive, or an array in it is not what it may be."""
+
+
+@dataclass(frozen=True)
+class ArrayHeader:
+    """What an array says of itself, found to fit its length."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype
+    fortran_order: bool
+
+
+class NpzFile:
+    """An open archive; made by ``open_npz``."""
+
+    def __init__(self, path: Path, archive: zipfile.ZipFile, most_bytes: int) -> None:
+        members = archive.infolist()
+        if len(members) > MOST_MEMBERS:
+            raise ArchiveError(f"'{path}' has {len(members)} members; an .npz file may have at most {MOST_MEMBERS}")
+        self.path, self.most_bytes, self._archive = path, most_bytes, archive
+        self.names = [member.filename.removesuffix(".npy") for member in members]
+        self._members = dict(zip(self.names, members, strict=True))
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._members
+
+    def header(self, name: str) -> ArrayHeader:
+        """Type and shape of an array.
+
+        Raises:
+            ArchiveError: the member is no plain array, too large, or not of the length that its header promises.
+        """
+        with self._reading(name) as handle:
+            return self._read_header(name, handle)
+
+    def read(self, name: str) -> np.ndarray:
+        """An array.
+
+        Raises:
+            ArchiveError: as for ``header``, or the data are damaged.
+        """
+        with self._reading(name) as handle:
+            header = self._read_header(name, handle)
+            count = _count(header)
+            content = handle.read(count * header.dtype.itemsize)
+            if len(content) != count * header.dtype.itemsize or handle.read(1):
+                raise ValueError(f"its data are not the {count} numbers that its header promises")
+            order = "F" if header.fortran_order else "C"
+            return np.frombuffer(content, header.dtype).reshape(header.shape, order=order)  # type: ignore[call-overload]
+
+    def _read_header(self, name: str, handle: zipfile.ZipExtFile) -> ArrayHeader:
+        size = self._members[name].file_size
+        if size > self.most_bytes:
+            raise ValueError(f"it unpacks to {size} bytes; at most {self.most_bytes} are read")
+        version = np.lib.format.read_magic(handle)
+        if version not in _HEADERS:
+            raise ValueError(f"it is of .npy version {version}; (1, 0) or (2, 0) is required")
+        shape, fortran_order, dtype = _HEADERS[version](handle)
+        header = ArrayHeader(tuple(int(side) for side in shape), dtype, fortran_order)
+        if dtype.kind not in _PLAIN or dtype.hasobject:
+            raise ValueError(f"it holds {dtype}, and only plain numbers and text are read, never pickled objects")
+        if min(header.shape, default=0) < 0 or size != handle.tell() + _count(header) * dtype.itemsize:
+            raise ValueError(f"its header says {dtype} {header.shape}, which does not fit {size} bytes")
+        return header
+
+    @contextmanager
+    def _reading(self, name: str) -> Iterator[zipfile.ZipExtFile]:
+        try:
+            with self._archive.open(self._members[name]) as handle:
+                yield handle  # type: ignore[misc]
+        # zipfile says NotImplementedError of a compression it does not know, RuntimeError of an encrypted file.
+        except (
+            OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError,
+            TypeError, SyntaxError, OverflowError, MemoryError,
+        ) as error:  # fmt: skip
+            raise ArchiveError(f"'{name}' in '{self.path}' is not a plain array: {error}") from None
+
+
+def _count(header: ArrayHeader) -> int:
+    count = 1
+    for side in header.shape:
+        count *= side
+    return count
+
+
+@contextmanager
+def open_npz(path: Path, most_bytes: int = MOST_BYTES) -> Iterator[NpzFile]:
+    """Opens an archive, as a context.
+
+    Args:
+        path: the file.
+        most_bytes: what one array may unpack to.
+
+    Raises:
+        ArchiveError: the file is missing, or no ``.npz`` archive.
+    """
+    try:
+        archive = zipfile.ZipFile(path)
+    except (OSError, zipfile.BadZipFile, ValueError, EOFError, NotImplementedError) as error:
+        raise ArchiveError(f"cannot read '{path}' as an .npz file: {error}") from None
+    with archive:
+        yield NpzFile(path, archive, most_bytes)
