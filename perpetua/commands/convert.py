@@ -4,22 +4,26 @@ from pathlib import Path
 
 import click
 
+from perpetua.formats.config import OUTPUTS
+
 
 @click.command()
 @click.argument("sequence", type=click.Path(path_type=Path))
 @click.option("--count", type=click.IntRange(min=1), default=1024, show_default=True, help="Tracks to draw.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Decides which.")
 @click.option("--from-pixels", metavar="VIEW:FRAME:STEP", help="Follow every STEP-th pixel of an image instead.")
+@click.option("--label", "labels", type=click.Choice(OUTPUTS), multiple=True,
+              help="Also write this label of every pixel. Can be given several times.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write.")
-def tracks(sequence: Path, count: int, seed: int, from_pixels: str | None, out: Path) -> None:
+def tracks(sequence: Path, count: int, seed: int, from_pixels: str | None, labels: tuple[str, ...], out: Path) -> None:
     """Write a finished sequence again with other tracks, any number of them, without rendering.
 
-    The run's work area must still be there.
+    The run's work area must still be there. Labels that export.outputs asked for are written again too.
     """
     from perpetua.pipeline.retrack import PixelChoice, write_other_tracks
 
     pixels = None if from_pixels is None else PixelChoice.parse(from_pixels)
-    made = write_other_tracks(sequence, out, count, seed, pixels)
+    made = write_other_tracks(sequence, out, count, seed, pixels, labels)
     click.echo(f"wrote {len(made.queries_xytv)} tracks to {out}")
 
 

@@ -2,11 +2,15 @@
 
 import re
 from math import isclose
+from typing import Literal, get_args
 
 from pydantic import Field, field_validator
 
 from perpetua.config_base import Section
 from perpetua.seeding import stream
+
+Output = Literal["object_index", "normals", "flow", "scene_flow", "view_flow"]
+OUTPUTS: tuple[str, ...] = get_args(Output)
 
 _FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 
@@ -18,6 +22,11 @@ class ExportConfig(Section):
         default={"train": 1.0},
         description="folders of the data splits, each with its share of the rooms, for example {train: 0.9, val: 0.1}; "
         "shares are in 0..1 and sum to 1",
+    )
+    outputs: tuple[Output, ...] = Field(
+        default=(),
+        description="labels of every pixel to write beside depth: object_index, normals, flow and scene_flow (to the "
+        "next frame), view_flow (to each other view); for example [normals, flow]",
     )
 
     @field_validator("splits")

@@ -1,20 +1,21 @@
 """Writer of the benchmark layout; ``perpetua.formats.layout`` lists its files."""
 
 import json
-from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
 
-from perpetua.actors.types import ActorMesh
 from perpetua.cameras.types import CameraPath
 from perpetua.files import file_sha256
 from perpetua.formats import layout
+from perpetua.formats.frame_file import FrameFile
+from perpetua.formats.label_files import write_labels
+from perpetua.formats.poses import object_poses
 from perpetua.geometry.transforms import invert_rigid
-from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import Room
+from perpetua.rendering.types import FilmedScene, RenderedView
 from perpetua.tracks.motion import MOVING_M, is_fast, travel_m
 from perpetua.tracks.surface import SceneMeshes, SurfacePoints, bind
 from perpetua.tracks.types import PointTracks, SequenceTracks
@@ -22,26 +23,35 @@ from perpetua.tracks.types import PointTracks, SequenceTracks
 
 def write_sequence(
     folder: Path,
-    room: Room,
-    actors: tuple[ActorMesh, ...],
-    cameras: tuple[CameraPath, ...],
-    views: tuple[RenderedView, ...],
+    scene: FilmedScene,
     tracks: SequenceTracks,
     record: dict[str, Any],
+    outputs: tuple[str, ...] = (),
 ) -> None:
     """Writes a sequence into ``folder``, which is made if need be; equal arguments give equal bytes.
 
-    ``record`` says where the sequence comes from.
+    Args:
+        folder: where the files go.
+        scene: what was rendered.
+        tracks: of its points.
+        record: says where the sequence comes from, and lists the objects: those of the room in its order, then actors.
+        outputs: labels of every pixel to write too, some of ``perpetua.formats.config.OUTPUTS``.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    _write_tracks(folder, tracks, SceneMeshes.of(room, actors))
-    actor_indices = [actor.object_index for actor in actors]
-    for index, (camera, view) in enumerate(zip(cameras, views, strict=True)):
+    _write_tracks(folder, tracks, SceneMeshes.of(scene.room, scene.actors))
+    actor_indices = [actor.object_index for actor in scene.actors]
+    for index, (camera, view) in enumerate(zip(scene.cameras, scene.views, strict=True)):
         view_folder = folder / str(index)
         view_folder.mkdir(exist_ok=True)
         np.save(view_folder / layout.VISIBILITY, tracks.views.visible[index])
+        np.save(view_folder / layout.TRACKS_2D, tracks.views.pixel_px[index].astype(np.float32))
         _write_camera(view_folder, camera)
         _write_frames(view_folder, view, actor_indices)
+    poses = object_poses(scene)
+    np.save(folder / layout.POSES, poses.world_from_object)
+    np.save(folder / layout.BOXES, poses.box_m)
+    if outputs:
+        record = {**record, "labels": {"outputs": sorted(outputs), **asdict(write_labels(folder, scene, outputs))}}
     _write_record(folder, tracks.points, record)
 
 
@@ -51,8 +61,9 @@ def _write_tracks(folder: Path, tracks: SequenceTracks, meshes: SceneMeshes) -> 
     np.save(folder / layout.QUERIES, tracks.queries_xytv)
     bound = bind(meshes, SurfacePoints(points.object_index, points.face, points.barycentric))
     frames, count, _ = points.position_m.shape
-    corners = (bound.corner_m(frame).astype(np.float32) for frame in range(frames))
-    _save_frames(folder / layout.SURFACE, (frames, count, 3, 3), np.float32, corners)
+    with FrameFile(folder / layout.SURFACE, (frames, count, 3, 3), np.float32) as file:
+        for frame in range(frames):
+            file.append(bound.corner_m(frame))
 
 
 def _write_camera(folder: Path, camera: CameraPath) -> None:
@@ -67,28 +78,24 @@ def _write_frames(folder: Path, view: RenderedView, actor_indices: list[int]) ->
     for frame, jpeg in enumerate(view.jpeg):
         jpegs[frame] = np.frombuffer(jpeg, np.uint8).copy()
     np.save(folder / layout.IMAGES, jpegs, allow_pickle=True)
-    shape = view.depth_m.shape
-    _save_frames(folder / layout.DEPTH, shape, np.float32, (np.asarray(depth_m) for depth_m in view.depth_m))
-    masks = (np.isin(object_index, actor_indices) for object_index in view.object_index)
-    _save_frames(folder / layout.FOREGROUND, shape, np.bool_, masks)
-
-
-def _save_frames(path: Path, shape: tuple[int, ...], dtype: type[np.generic], frames: Iterator[np.ndarray]) -> None:
-    """A ``.npy`` file of stacked frames that are never all in memory."""
-    header = {"descr": np.lib.format.dtype_to_descr(np.dtype(dtype)), "fortran_order": False, "shape": shape}
-    with path.open("wb") as handle:
-        np.lib.format.write_array_header_1_0(handle, header)
-        for frame in frames:
-            handle.write(np.ascontiguousarray(frame, dtype).tobytes())
+    with (
+        FrameFile(folder / layout.DEPTH, view.depth_m.shape, np.float32) as depth,
+        FrameFile(folder / layout.FOREGROUND, view.depth_m.shape, np.bool_) as foreground,
+    ):
+        for depth_m, object_index in zip(view.depth_m, view.object_index, strict=True):
+            depth.append(np.asarray(depth_m))
+            foreground.append(np.isin(object_index, actor_indices))
 
 
 def _write_record(folder: Path, points: PointTracks, record: dict[str, Any]) -> None:
-    category = {thing["object_index"]: thing["category"] for thing in record.get("objects", [])}
+    objects = {thing["object_index"]: thing for thing in record.get("objects", [])}
+    owners = [objects.get(index, {}) for index in points.object_index.tolist()]
     merged = {
         **record,
         "tracks": {
             "object_index": points.object_index.tolist(),
-            "category": [category.get(index) for index in points.object_index.tolist()],
+            "category": [owner.get("category") for owner in owners],
+            "actor": [owner.get("actor") for owner in owners],
             "class": _classes(points.position_m),
             "face": points.face.tolist(),
             "barycentric": points.barycentric.tolist(),

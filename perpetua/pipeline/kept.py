@@ -7,17 +7,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt16
 
-from perpetua.actors.types import ActorMesh, Route
+from perpetua.actors.types import Route
 from perpetua.audit.deep_scene import DeepScene
-from perpetua.cameras.types import CameraPath
 from perpetua.errors import InputError
 from perpetua.formats.source import KeptMeshes
 from perpetua.pipeline import codec
 from perpetua.pipeline.layout import WORK_FOLDER, RunRecord, read_run
 from perpetua.pipeline.stages import STAGES
 from perpetua.pipeline.store import StageFolder
-from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import Room
+from perpetua.rendering.types import FilmedScene
 
 
 @dataclass(frozen=True)
@@ -26,11 +24,8 @@ class KeptScene:
 
     run: RunRecord
     room_number: int
-    room: Room
     routes: tuple[Route, ...]
-    actors: tuple[ActorMesh, ...]
-    cameras: tuple[CameraPath, ...]
-    views: tuple[RenderedView, ...]
+    scene: FilmedScene
 
 
 def load_kept_scene(sequence_folder: Path) -> KeptScene:
@@ -45,16 +40,8 @@ def load_kept_scene(sequence_folder: Path) -> KeptScene:
             f"the work area of '{sequence_folder}' is not kept (no {WORK_FOLDER}/{work.name} in its output folder): "
             "run the same perpetua generate again with a new --out, and no perpetua clean after it"
         )
-    kept = {name: _load(work, name) for name in ("room", "routes", "actors", "cameras", "render")}
-    return KeptScene(
-        run=read_run(work.parent.parent),
-        room_number=_room_number(work),
-        room=kept["room"],
-        routes=kept["routes"],
-        actors=kept["actors"],
-        cameras=kept["cameras"],
-        views=kept["render"],
-    )
+    scene = FilmedScene(*(_load(work, name) for name in ("room", "motion", "actors", "cameras", "render")))
+    return KeptScene(read_run(work.parent.parent), _room_number(work), _load(work, "routes"), scene)
 
 
 def kept_object_index(sequence_folder: Path) -> tuple[UInt16[np.ndarray, "T H W"], ...] | None:
@@ -101,5 +88,5 @@ def load_deep_scene(sequence_folder: Path) -> DeepScene:
     Raises:
         InputError: the work area is not kept.
     """
-    kept = load_kept_scene(sequence_folder)
-    return DeepScene(kept.room, kept.actors, tuple(view.object_index for view in kept.views))
+    scene = load_kept_scene(sequence_folder).scene
+    return DeepScene(scene.room, scene.actors, tuple(view.object_index for view in scene.views))

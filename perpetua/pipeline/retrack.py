@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from perpetua.errors import InputError
+from perpetua.formats.config import OUTPUTS
 from perpetua.formats.tapvid_mv import write_sequence
 from perpetua.pipeline.kept import KeptScene, load_kept_scene
 from perpetua.pipeline.record import sequence_record
@@ -39,7 +40,12 @@ class PixelChoice:
 
 
 def write_other_tracks(
-    sequence_folder: Path, target: Path, count: int, seed: int, pixels: PixelChoice | None
+    sequence_folder: Path,
+    target: Path,
+    count: int,
+    seed: int,
+    pixels: PixelChoice | None,
+    outputs: tuple[str, ...] = (),
 ) -> SequenceTracks:
     """Writes the sequence once more with other tracks, a whole folder in the benchmark layout.
 
@@ -49,6 +55,7 @@ def write_other_tracks(
         count: tracks to draw, with the run's other settings.
         seed: of the draw; the run's own seed and count give the sequence's own tracks.
         pixels: follow these pixels instead of drawing.
+        outputs: labels of every pixel to write, besides those of the run.
 
     Raises:
         InputError: the work area is not kept, or ``target`` exists.
@@ -62,18 +69,22 @@ def write_other_tracks(
     moving = float((travel_m(tracks.points.position_m) > MOVING_M).mean())
     made = {"count": len(tracks.queries_xytv)} | ({} if pixels is None else {"dynamic_share": moving, "min_visible": 1})
     config = kept.run.config
-    config = config.model_copy(update={"tracks": config.tracks.model_copy(update=made)})
-    record = sequence_record(config, StageSeed(seed, kept.room_number, "tracks"), kept.room, kept.routes, kept.actors)
+    labels = tuple(name for name in OUTPUTS if name in (*outputs, *config.export.outputs))
+    export = config.export.model_copy(update={"outputs": labels})
+    config = config.model_copy(update={"tracks": config.tracks.model_copy(update=made), "export": export})
+    scene = kept.scene
+    record = sequence_record(config, StageSeed(seed, kept.room_number, "tracks"), scene.room, kept.routes, scene.actors)
     partial = target.with_name(f".{target.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
-    write_sequence(partial, kept.room, kept.actors, kept.cameras, kept.views, tracks, record)
+    write_sequence(partial, scene, tracks, record, labels)
     replace_folder(partial, target)
     return tracks
 
 
 def _make(kept: KeptScene, count: int, seed: int, pixels: PixelChoice | None) -> SequenceTracks:
     config = kept.run.config.tracks.model_copy(update={"count": count})
-    scene = TrackScene(kept.room, kept.actors, kept.cameras, kept.views, config)
+    filmed = kept.scene
+    scene = TrackScene(filmed.room, filmed.actors, filmed.cameras, filmed.views, config)
     if pixels is not None:
         return make_pixel_tracks(scene, pixels.view, pixels.frame, pixels.step)
     return make_tracks(scene, StageSeed(seed, kept.room_number, "tracks"))

@@ -32,7 +32,7 @@ from perpetua.pipeline.record import sequence_record
 from perpetua.rendering.bake import BAKE_SCRIPT
 from perpetua.rendering.job import PROCESS_SETTINGS
 from perpetua.rendering.render import BAKED_FOLDER, RENDER_SCRIPT, render_views
-from perpetua.rendering.types import RenderedView
+from perpetua.rendering.types import FilmedScene, RenderedView
 from perpetua.rooms.build import build_room
 from perpetua.rooms.scene_file_checks import scene_digests
 from perpetua.rooms.types import Room
@@ -280,16 +280,17 @@ def _tracks(context: StageContext) -> SequenceTracks:
 
 
 def _export(context: StageContext) -> None:
-    room, actors = context.one("room", Room), context.many("actors", ActorMesh)
-    write_sequence(
-        context.folder / SEQUENCE_FOLDER,
-        room,
-        actors,
+    scene = FilmedScene(
+        context.one("room", Room),
+        context.many("motion", BodyMotion),
+        context.many("actors", ActorMesh),
         context.many("cameras", CameraPath),
         context.many("render", RenderedView),
-        context.one("tracks", SequenceTracks),
-        sequence_record(context.config, context.seed, room, context.many("routes", Route), actors),
     )
+    config = context.config
+    record = sequence_record(config, context.seed, scene.room, context.many("routes", Route), scene.actors)
+    tracks = context.one("tracks", SequenceTracks)
+    write_sequence(context.folder / SEQUENCE_FOLDER, scene, tracks, record, config.export.outputs)
 
 
 def _audit(context: StageContext) -> None:
@@ -353,11 +354,11 @@ STAGES = (
     Stage(
         90,
         "export",
-        2,
-        ("room", "routes", "actors", "cameras", "render", "tracks"),
+        3,
+        ("room", "routes", "motion", "actors", "cameras", "render", "tracks"),
         lambda config: config.model_dump(mode="json"),
         _export,
     ),
-    Stage(95, "audit", 3, ("actors", "cameras", "tracks", "export"), _settings("audit"), _audit),
+    Stage(95, "audit", 4, ("actors", "cameras", "tracks", "export"), _settings("audit"), _audit),
 )
 STAGE_NAMES = tuple(stage.name for stage in STAGES)

@@ -3,11 +3,9 @@
 import numpy as np
 
 from perpetua.errors import InputError, TrackError
-from perpetua.geometry.pinhole import unproject
-from perpetua.geometry.transforms import transform_points
 from perpetua.tracks.follow import TrackScene
-from perpetua.tracks.sight import NOTHING
-from perpetua.tracks.surface import SurfacePoints, plane_barycentric
+from perpetua.tracks.pixel_hits import hit_pixels
+from perpetua.tracks.surface import SurfacePoints
 from perpetua.tracks.types import SequenceTracks
 
 
@@ -34,21 +32,7 @@ def make_pixel_tracks(scene: TrackScene, view: int, frame: int, step: int) -> Se
 
 
 def _points(scene: TrackScene, view: int, frame: int, step: int) -> SurfacePoints:
-    """The exact points where rays through pixel centres meet opaque meshes."""
     camera = scene.cameras[view]
     row, column = np.mgrid[: camera.intrinsics.height_px : step, : camera.intrinsics.width_px : step].reshape(2, -1)
     pixel_px = np.stack([column, row], axis=1).astype(np.float64)
-    world_from_camera = camera.world_from_camera[frame]
-    eye_m = world_from_camera[:3, 3].copy()
-    direction = transform_points(world_from_camera, unproject(camera.intrinsics, pixel_px, np.ones(len(pixel_px))))
-    direction = direction - eye_m
-    hits = scene.sight.first_hit(frame, eye_m, direction)
-    met = hits.object_index != NOTHING
-    points = SurfacePoints(hits.object_index[met], hits.face[met], np.zeros((int(met.sum()), 3)))
-    unit = direction[met] / np.linalg.norm(direction[met], axis=1, keepdims=True)
-    place_m = eye_m + hits.distance_m[met, None] * unit
-    weight = plane_barycentric(place_m, scene.bind(points).corner_m(frame))
-    sound = np.isfinite(weight).all(axis=1)
-    weight = np.clip(weight[sound], 0.0, None)
-    weight /= weight.sum(axis=1, keepdims=True)
-    return SurfacePoints(points.object_index[sound], points.face[sound], weight)
+    return hit_pixels(scene.sight, camera.intrinsics, camera.world_from_camera[frame], frame, pixel_px).bound.points

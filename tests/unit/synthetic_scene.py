@@ -1,6 +1,5 @@
 """A box room with a table and a walking ball-headed box, rendered by ray casting: ground truth without Blender."""
 
-from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
 
@@ -8,26 +7,20 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from perpetua.actors.types import ActorMesh, ActorPart
+from perpetua.actors.types import ActorMesh, ActorPart, BodyMotion
 from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.raycast import Caster
 from perpetua.geometry.transforms import look_at
-from perpetua.rendering.types import RenderedView
+from perpetua.rendering.types import FilmedScene, RenderedView
 from perpetua.rooms.types import Material, Room, SceneObject
 
 GREY = Material("grey", (0.5, 0.5, 0.5))
 
 
-@dataclass(frozen=True)
-class Scene:
-    """What the stages before the tracks would hand on."""
-
-    room: Room
-    actors: tuple[ActorMesh, ...]
-    cameras: tuple[CameraPath, ...]
-    views: tuple[RenderedView, ...]
+# What the stages before the tracks would hand on.
+Scene = FilmedScene
 
 
 def tri(mesh: trimesh.Trimesh) -> TriMesh:
@@ -77,12 +70,34 @@ def make_actor(frames: int, actor: int, object_index: int) -> ActorMesh:
     )
     vertices = np.empty((frames, len(rest), 3), np.float32)
     for frame in range(frames):
-        angle = 0.25 * frame + 2.0 * actor
-        turn = trimesh.transformations.rotation_matrix(angle, [0, 0, 1])[:3, :3]
-        centre = np.array([1.1 * np.cos(angle), 0.9 * np.sin(angle), 0.0])
-        lean = np.array([0.05, 0.0, 0.0]) * np.sin(angle) * rest[:, 2:]
+        turn, centre = walk(frame, actor)
+        lean = np.array([0.05, 0.0, 0.0]) * np.sin(walk_angle(frame, actor)) * rest[:, 2:]
         vertices[frame] = (rest + lean) @ turn.T + centre
     return ActorMesh(actor, object_index, "a capsule in a shirt", parts, vertices)
+
+
+def walk_angle(frame: int, actor: int) -> float:
+    """How far round an actor has walked."""
+    return 0.25 * frame + 2.0 * actor
+
+
+def walk(frame: int, actor: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation and place of an actor."""
+    angle = walk_angle(frame, actor)
+    turn = trimesh.transformations.rotation_matrix(angle, [0, 0, 1])[:3, :3]
+    return turn, np.array([1.1 * np.cos(angle), 0.9 * np.sin(angle), 0.0])
+
+
+def make_motion(frames: int, actor: int) -> BodyMotion:
+    """The motion of ``make_actor``: a pelvis 0.8 m over where it walks, all joints turned alike."""
+    turns, centres = zip(*(walk(frame, actor) for frame in range(frames)), strict=True)
+    return BodyMotion(
+        actor,
+        24.0,
+        np.repeat(np.stack(turns)[:, None], 22, axis=1),
+        np.stack(centres) + np.array([0.0, 0.0, 0.8]),
+        np.zeros((frames, 4), bool),
+    )
 
 
 def make_cameras(frames: int, count: int, width_px: int, height_px: int) -> tuple[CameraPath, ...]:
@@ -146,6 +161,7 @@ def render(room: Room, actors: tuple[ActorMesh, ...], camera: CameraPath) -> Ren
 def make_scene(frames: int = 6, cameras: int = 3, width_px: int = 96, height_px: int = 72, actors: int = 2) -> Scene:
     """The scene, rendered once per size."""
     room = make_room()
+    motions = tuple(make_motion(frames, k) for k in range(actors))
     people = tuple(make_actor(frames, k, room.next_object_index + k) for k in range(actors))
     paths = make_cameras(frames, cameras, width_px, height_px)
-    return Scene(room, people, paths, tuple(render(room, people, path) for path in paths))
+    return Scene(room, motions, people, paths, tuple(render(room, people, path) for path in paths))

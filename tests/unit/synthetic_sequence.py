@@ -20,13 +20,13 @@ def make_scene_tracks(scene: Scene, config: TracksConfig = CONFIG, seed: int = 5
     return make_tracks(seen, StageSeed(seed, 0, "tracks"))
 
 
-def write_scene(folder: Path) -> tuple[Scene, SequenceTracks]:
-    """Writes the synthetic scene in the benchmark layout."""
+def write_scene(folder: Path, outputs: tuple[str, ...] = ()) -> tuple[Scene, SequenceTracks]:
+    """Writes the synthetic scene in the benchmark layout, with labels of every pixel on demand."""
     scene = make_scene()
     tracks = make_scene_tracks(scene)
     names = [{"object_index": thing.object_index, "category": thing.category} for thing in scene.room.objects]
     names += [
         {"object_index": actor.object_index, "category": "person", "actor": actor.actor} for actor in scene.actors
     ]
-    write_sequence(folder, scene.room, scene.actors, scene.cameras, scene.views, tracks, {"seed": 5, "objects": names})
+    write_sequence(folder, scene, tracks, {"seed": 5, "objects": names}, outputs)
     return scene, tracks

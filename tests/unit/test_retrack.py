@@ -36,7 +36,8 @@ def sequence(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene = make_scene()
     routes = tuple(Route(actor.actor, np.zeros((6, 3)), np.zeros(6)) for actor in scene.actors)
     values = {
-        "room": scene.room, "routes": routes, "actors": scene.actors, "cameras": scene.cameras, "render": scene.views,
+        "room": scene.room, "routes": routes, "motion": scene.motions, "actors": scene.actors, "cameras": scene.cameras,
+        "render": scene.views,
     }  # fmt: skip
     for stage in STAGES:
         if stage.name in values:

@@ -1,0 +1,1 @@
+"""Labels of every pixel, computed from the meshes: normals, scene flow, optical flow between frames and views."""
