@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float32, UInt8
+from jaxtyping import Bool, Float32, UInt8, UInt16
 
 from perpetua.errors import SequenceFormatError
 from perpetua.formats import layout
@@ -16,7 +16,8 @@ from perpetua.formats.safe_pickle import read_byte_arrays
 
 @dataclass(frozen=True)
 class SequenceView:
-    """One view. ``depth_m`` (0: none) and ``foreground`` stay on disk until they are read; either may be missing."""
+    """One view. ``depth_m`` (0: none), ``foreground`` and ``object_index`` stay on disk until they are read, and may be
+    missing."""
 
     jpeg: tuple[UInt8[np.ndarray, " _"], ...]
     intrinsics_px: Float32[np.ndarray, "4"]
@@ -24,6 +25,7 @@ class SequenceView:
     visible: Bool[np.ndarray, "F P"]
     depth_m: Float32[np.ndarray, "F H W"] | None
     foreground: Bool[np.ndarray, "F H W"] | None
+    object_index: UInt16[np.ndarray, "F H W"] | None = None
 
     def image(self, frame: int) -> UInt8[np.ndarray, "H W 3"]:
         """The decoded RGB image of a frame."""
@@ -104,6 +106,7 @@ def read_view(folder: Path, name: str, frames: int, count: int) -> SequenceView:
         read_array(folder, f"{name}/{layout.VISIBILITY}", np.bool_, (frames, count)),
         _optional(folder, f"{name}/{layout.DEPTH}", np.float32, picture),
         _optional(folder, f"{name}/{layout.FOREGROUND}", np.bool_, picture),
+        _optional(folder, f"{name}/{layout.OBJECT_INDEX}", np.uint16, picture),
     )
 
 

@@ -24,8 +24,10 @@ from torch.utils.data import Dataset
 
 from perpetua.errors import InputError, SequenceFormatError
 from perpetua.formats import layout
+from perpetua.formats.config import OUTPUTS
 from perpetua.formats.reader import SequenceView, read_array, read_view, view_names
 from perpetua.formats.resize import PixelCentreResize
+from perpetua.formats.torch_labels import read_labels
 from perpetua.geometry.transforms import transform_points
 from perpetua.tracks.queries import draw_queries
 from perpetua.tracks.types import ViewTracks
@@ -52,6 +54,13 @@ class Clip(NamedTuple):
         queries_xytv: x, y, frame, view at which each track is asked for, frame and view counted within the clip. The
             sequence's own queries for the whole of it; otherwise drawn anew by the sequence's rule among what the clip
             sees, and NaN for tracks that it never sees.
+        labels: the labels of every pixel that were asked for, channels before rows; when resized, of the nearest pixel.
+            See ``perpetua.formats.layout`` for what they mean.
+
+            ``object_index`` (V,T,H,W) int64; ``normals`` (V,T,3,H,W); ``scene_flow`` (V,T,3,H,W); ``flow`` (V,T,2,H,W)
+            with ``flow_state`` (V,T,H,W) uint8; ``view_flow`` (V,V,T,2,H,W) from the first to the second of the clip's
+            views with ``view_flow_state`` (V,V,T,H,W), where a view's flow to itself is 0 and has state 0. Flow leads
+            to the next frame of the sequence; its last frame has none: 0, with state 0.
     """
 
     name: str
@@ -66,6 +75,7 @@ class Clip(NamedTuple):
     pixel_px: Float32[Tensor, "V T P 2"]
     visible: Bool[Tensor, "V T P"]
     queries_xytv: Float32[Tensor, "P 4"]
+    labels: dict[str, Tensor]
 
 
 @dataclass(frozen=True)
@@ -91,6 +101,7 @@ class SequenceDataset(Dataset[Clip]):
             ``perpetua.formats.resize``.
         depth: whether clips have depth.
         foreground: whether clips have masks of the people.
+        labels: which labels of every pixel clips have, some of ``perpetua.formats.config.OUTPUTS``.
 
     Raises:
         InputError: a setting does not fit a sequence.
@@ -108,12 +119,19 @@ class SequenceDataset(Dataset[Clip]):
         size_px: tuple[int, int] | None = None,
         depth: bool = True,
         foreground: bool = True,
+        labels: tuple[str, ...] = (),
     ) -> None:
+        if not set(labels) <= set(OUTPUTS):
+            raise InputError(f"labels must be among {', '.join(OUTPUTS)}, not {', '.join(labels)}")
+        if frame_step > 1 and {"flow", "scene_flow"} & set(labels):
+            raise InputError(f"flow leads to the next frame, so frame_step must be 1 with it, not {frame_step}")
+        if views is not None and len(set(views)) < 2 and "view_flow" in labels:
+            raise InputError(f"view_flow leads from view to view, so at least two views are required, not {views}")
         wanted = {"clip_frames": clip_frames, "clip_stride": clip_stride, "frame_step": frame_step}
         for setting, value in wanted.items():
             if value is not None and value < 1:
                 raise InputError(f"{setting} must be at least 1, not {value}")
-        self.size_px, self.depth, self.foreground = size_px, depth, foreground
+        self.size_px, self.depth, self.foreground, self.labels = size_px, depth, foreground, labels
         self._places = [
             place
             for folder in folders
@@ -153,6 +171,7 @@ class SequenceDataset(Dataset[Clip]):
             pixel_px=torch.from_numpy(pixel_px).float(),
             visible=torch.from_numpy(visible),
             queries_xytv=torch.from_numpy(_queries(place, np.stack([part.scale for part in parts]), pixel_px, visible)),
+            labels=read_labels(place.folder, place.views, place.frames, place.length, self.labels, self.size_px),
         )
 
     def _read_part(

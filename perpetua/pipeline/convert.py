@@ -11,21 +11,25 @@ from perpetua.pipeline.kept import kept_meshes, kept_object_index
 
 
 def load_source(sequence_folder: Path) -> ExportSource:
-    """A finished sequence, with the rendered object index and the meshes where its work area is kept.
+    """A finished sequence, with the rendered object index if it was written (``export.outputs``) or its work area is
+    kept, and with the meshes if that is kept.
 
     Raises:
         SequenceFormatError: the sequence is damaged.
     """
     name = sequence_folder.resolve().name
     sequence = read_sequence(sequence_folder)
-    return ExportSource(name, sequence, kept_object_index(sequence_folder), kept_meshes(sequence_folder))
+    own = tuple(view.object_index for view in sequence.views if view.object_index is not None)
+    complete = sequence.record is not None and len(own) == len(sequence.views)
+    object_index = own if complete else kept_object_index(sequence_folder)
+    return ExportSource(name, sequence, object_index, kept_meshes(sequence_folder))
 
 
 def export_sequence(sequence_folder: Path, export_format: str, target: Path) -> list[Path]:
     """Writes a sequence into the folder ``target`` in another layout; returns what it added there.
 
     The sequence alone is enough. Where its work area is kept, formats that tell objects apart or show meshes take
-    these from it.
+    these from it; an object index among the sequence's own files comes first.
 
     Raises:
         InputError: something of the same name is in ``target``.

@@ -177,6 +177,20 @@ def test_kubric_without_work_area_tells_people_from_the_rest(
     }
 
 
+def test_kubric_takes_the_object_index_of_the_sequence_itself(
+    made: tuple[Path, Scene, SequenceTracks], tmp_path: Path
+) -> None:
+    folder, scene, tracks = made
+    copy = _copy(folder, tmp_path / NAME)
+    for view, rendered in enumerate(scene.views):
+        np.save(copy / f"{view}/object_index.npy", rendered.object_index)
+    (written,) = export_sequence(copy, "kubric", tmp_path / "out")
+    segmentation = cv2.imread(str(written / "view_2" / "segmentation_00004.png"), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(segmentation, scene.views[2].object_index[4])
+    ids = np.load(written / "tracks_segmentation_ids.npz")["tracks_segmentation_ids"]
+    np.testing.assert_array_equal(ids, tracks.points.object_index)
+
+
 def test_a_sequence_of_others_needs_no_record(made: tuple[Path, Scene, SequenceTracks], tmp_path: Path) -> None:
     """Which tracks are on people is then read off the mask, at the pixels that show them."""
     copy = _copy(made[0], tmp_path / "in" / "clip12")

@@ -10,6 +10,7 @@ from synthetic_sequence import write_scene
 from torch.utils.data import DataLoader
 
 from perpetua.errors import InputError, SequenceFormatError
+from perpetua.formats.config import OUTPUTS
 from perpetua.formats.reader import Sequence, read_sequence
 from perpetua.formats.resize import PixelCentreResize
 from perpetua.formats.torch_dataset import Clip, SequenceDataset
@@ -170,3 +171,58 @@ def test_settings_that_do_not_fit_are_errors(
 ) -> None:
     with pytest.raises(InputError, match=message):
         SequenceDataset([made[0]], **settings)[0]  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def labelled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Scene]:
+    folder = tmp_path_factory.mktemp("labelled") / "seed5-room0000"
+    scene, _ = write_scene(folder, OUTPUTS)
+    return folder, scene
+
+
+def test_labels_come_as_they_are_stored(labelled: tuple[Path, Scene]) -> None:
+    folder, scene = labelled
+    clip = SequenceDataset([folder], views=(2, 0), clip_frames=2, clip_stride=4, labels=OUTPUTS)[1]
+    assert clip.frames.tolist() == [4, 5]
+    np.testing.assert_array_equal(clip.labels["object_index"][1].numpy(), scene.views[0].object_index[4:])
+    normal = np.load(folder / "2/normals.npy")[4:]
+    np.testing.assert_array_equal(clip.labels["normals"][0].permute(0, 2, 3, 1).numpy(), normal)
+    for name, channels in (("flow", 2), ("scene_flow", 3)):
+        stored = np.load(folder / f"2/{name}.npy")
+        assert clip.labels[name].shape == (2, 2, channels, HEIGHT_PX, WIDTH_PX)
+        np.testing.assert_array_equal(clip.labels[name][0, 0].permute(1, 2, 0).numpy(), stored[4])
+        assert not clip.labels[name][:, 1].any(), "the last frame has no next one"
+    assert clip.labels["flow_state"][0, 0].any() and not clip.labels["flow_state"][:, 1].any()
+    between, state = clip.labels["view_flow"], clip.labels["view_flow_state"]
+    assert between.shape == (2, 2, 2, 2, HEIGHT_PX, WIDTH_PX) and state.shape == (2, 2, 2, HEIGHT_PX, WIDTH_PX)
+    np.testing.assert_array_equal(between[1, 0, 1].permute(1, 2, 0).numpy(), np.load(folder / "0/flow_to_2.npy")[5])
+    np.testing.assert_array_equal(state[0, 1].numpy(), np.load(folder / "2/flow_to_0_state.npy")[4:])
+    assert not between[0, 0].any() and not state[1, 1].any()
+
+
+def test_resized_flow_is_in_resized_pixels(labelled: tuple[Path, Scene]) -> None:
+    """Corner pixels stay corner pixels, and each new pixel has the flow of the nearest old one."""
+    folder, _ = labelled
+    clip = SequenceDataset([folder], size_px=(191, 36), labels=("flow", "view_flow"))[0]
+    old, new = np.load(folder / "1/flow.npy")[2], clip.labels["flow"][1, 2].permute(1, 2, 0).numpy()
+    scale = np.array([190 / 95, 35 / 71], np.float32)
+    for corner in ((0, 0), (0, -1), (-1, 0), (-1, -1)):
+        np.testing.assert_allclose(new[corner], old[corner] * scale, rtol=1e-6)
+    assert clip.labels["flow_state"].shape == (VIEWS, FRAMES, 36, 191)
+    np.testing.assert_allclose(
+        clip.labels["view_flow"][0, 2, 0, :, 0, 0].numpy(), np.load(folder / "0/flow_to_2.npy")[0, 0, 0] * scale
+    )
+
+
+def test_labels_that_cannot_be_had_are_refused(
+    labelled: tuple[Path, Scene], made: tuple[Path, Scene, Sequence]
+) -> None:
+    with pytest.raises(InputError, match="labels must be among object_index, normals"):
+        SequenceDataset([labelled[0]], labels=("albedo",))
+    with pytest.raises(InputError, match="frame_step must be 1"):
+        SequenceDataset([labelled[0]], frame_step=2, clip_frames=2, labels=("flow",))
+    with pytest.raises(InputError, match="at least two views"):
+        SequenceDataset([labelled[0]], views=(1,), labels=("view_flow",))
+    with pytest.raises(SequenceFormatError, match=r"normals\.npy' is missing: make the sequence with this label"):
+        SequenceDataset([made[0]], labels=("normals",))[0]
+    assert SequenceDataset([made[0]])[0].labels == {}

@@ -17,7 +17,7 @@ TORCH_MODULES = (
     "perpetua/actors/",
     "perpetua/cameras/",
     "perpetua/doctor.py",
-    "perpetua/formats/torch_dataset.py",
+    "perpetua/formats/torch_",
 )
 OPTIONAL = {"submitit": "perpetua/cluster/", "rerun": "perpetua/formats/"}
 
