@@ -12,10 +12,11 @@ from perpetua.audit.report import Check
 
 
 def check_finite(files: SequenceFiles, bounds: AuditConfig) -> Check:
-    """No NaN, no infinity; depth within an indoor scene, 0 where there is none."""
+    """No NaN, no infinity; depth within an indoor scene, 0 where there is none. Pixels of tracks have a check of their
+    own, because a point behind the camera has none."""
     faults: list[str] = []
     for name, array in sorted(files.arrays.items()):
-        if array.dtype != np.float32:
+        if array.dtype != np.float32 or name.endswith("tracks_xy.npy"):
             continue
         is_depth = name.endswith("depth.npy")
         for frame, values in enumerate(array if array.ndim > 2 else array[None]):
@@ -72,7 +73,7 @@ def check_cameras(files: SequenceFiles, bounds: AuditConfig) -> Check:
                 faults.append(f"{view}/intrinsics.npy is {intrinsics.tolist()} for an image of {width}x{height}")
         extrinsics = files.arrays.get(f"{view}/extrinsics_w2c.npy")
         if extrinsics is not None:
-            error = _rigid_error(np.asarray(extrinsics, np.float64))
+            error = rigid_error(np.asarray(extrinsics, np.float64))
             frame = int(error.argmax())
             worst = max(worst, float(error[frame]))
             if not error[frame] <= bounds.rotation_error:
@@ -81,7 +82,7 @@ def check_cameras(files: SequenceFiles, bounds: AuditConfig) -> Check:
     return Check("cameras", not faults, worst, bound, "; ".join(faults[:5]))
 
 
-def _rigid_error(pose: Float[np.ndarray, "F 4 4"]) -> Float[np.ndarray, " F"]:
+def rigid_error(pose: Float[np.ndarray, "F 4 4"]) -> Float[np.ndarray, " F"]:
     """Largest deviation from a rotation of determinant 1 over the bottom row 0 0 0 1; infinite for NaN."""
     rotation = pose[:, :3, :3]
     error = np.abs(rotation @ rotation.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))

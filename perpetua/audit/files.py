@@ -11,7 +11,8 @@ from perpetua.audit.report import Check
 from perpetua.errors import SequenceFormatError
 from perpetua.formats.safe_pickle import read_byte_arrays
 
-# Letters stand for lengths: F frames, P tracks, H and W the image. The first file that has one settles it.
+# Letters stand for lengths: F frames, E one less, P tracks, K objects, H and W a view's image. The first file that has
+# one settles it.
 SEQUENCE_FILES: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "tracks_xyz.npy": ("float32", ("F", "P", 3)),
     "queries_xytv.npy": ("float32", ("P", 4)),
@@ -23,7 +24,21 @@ VIEW_FILES: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "depth.npy": ("float32", ("F", "H", "W")),
     "foreground_mask.npy": ("bool", ("F", "H", "W")),
 }
-OPTIONAL_FILES: dict[str, tuple[str, tuple[str | int, ...]]] = {"surface_xyz.npy": ("float32", ("F", "P", 3, 3))}
+# What data from elsewhere may lack.
+PICTURE_FILES = ("depth.npy", "foreground_mask.npy")
+OPTIONAL_FILES: dict[str, tuple[str, tuple[str | int, ...]]] = {
+    "surface_xyz.npy": ("float32", ("F", "P", 3, 3)),
+    "object_poses.npy": ("float32", ("F", "K", 4, 4)),
+    "object_boxes.npy": ("float32", ("F", "K", 2, 3)),
+}
+OPTIONAL_VIEW_FILES: dict[str, tuple[str, tuple[str | int, ...]]] = {
+    "tracks_xy.npy": ("float32", ("F", "P", 2)),
+    "object_index.npy": ("uint16", ("F", "H", "W")),
+    "normals.npy": ("float32", ("F", "H", "W", 3)),
+    "scene_flow.npy": ("float32", ("E", "H", "W", 3)),
+    "flow.npy": ("float32", ("E", "H", "W", 2)),
+    "flow_state.npy": ("uint8", ("E", "H", "W")),
+}
 IMAGES_FILE = "images_jpeg_bytes.npy"
 RECORD_FILE = "sequence.json"
 
@@ -43,6 +58,18 @@ class SequenceFiles:
         """An array of a view."""
         return self.arrays[f"{view}/{name}"]
 
+    def every_view_has(self, *names: str) -> bool:
+        """Whether all views have some files."""
+        return all(f"{view}/{name}" in self.arrays for view in self.views for name in names)
+
+    @property
+    def actors(self) -> list[int]:
+        """Object indices of the record's actors; none where there is no sound record."""
+        try:
+            return [int(thing["object_index"]) for thing in (self.record or {})["objects"] if "actor" in thing]
+        except (KeyError, TypeError, ValueError):
+            return []
+
 
 def load_files(folder: Path) -> tuple[SequenceFiles, list[Check]]:
     """Loads what can be loaded; the checks say what could not."""
@@ -54,11 +81,16 @@ def load_files(folder: Path) -> tuple[SequenceFiles, list[Check]]:
     for name, rule in OPTIONAL_FILES.items():
         if (folder / name).exists():
             _load(files, name, rule, faults)
+    _load_record(files, faults)
     for view in files.views:
         for name, rule in VIEW_FILES.items():
-            _load(files, f"{view}/{name}", rule, faults)
+            # Ours always has depth and masks; others may do without.
+            if files.record is not None or name not in PICTURE_FILES or (folder / view / name).exists():
+                _load(files, f"{view}/{name}", rule, faults)
+        for name, rule in _optional_of_view(files.views, view).items():
+            if (folder / view / name).exists():
+                _load(files, f"{view}/{name}", rule, faults)
         _load_images(files, view, faults)
-    _load_record(files, faults)
     bound = "every file of the layout, exact types and shapes"
     return files, [Check("layout", not faults, float(len(faults)), bound, "; ".join(faults[:5]))]
 
@@ -73,6 +105,15 @@ def _views(folder: Path, faults: list[str]) -> list[str]:
     return found
 
 
+def _optional_of_view(views: list[str], view: str) -> dict[str, tuple[str, tuple[str | int, ...]]]:
+    rules = dict(OPTIONAL_VIEW_FILES)
+    for other in views:
+        if other != view:
+            rules[f"flow_to_{other}.npy"] = ("float32", ("F", "H", "W", 2))
+            rules[f"flow_to_{other}_state.npy"] = ("uint8", ("F", "H", "W"))
+    return rules
+
+
 def _load(files: SequenceFiles, name: str, rule: tuple[str, tuple[str | int, ...]], faults: list[str]) -> None:
     dtype, shape = rule
     path = files.folder / name
@@ -84,17 +125,19 @@ def _load(files: SequenceFiles, name: str, rule: tuple[str, tuple[str | int, ...
     except (OSError, ValueError, EOFError) as error:
         faults.append(f"{name} is missing" if not path.exists() else f"{name} cannot be read: {error}")
         return
-    fault = _fault(files, array, dtype, shape)
+    fault = _fault(files, name, array, dtype, shape)
     if fault:
         faults.append(f"{name} {fault}")
     else:
         files.arrays[name] = array
 
 
-def _fault(files: SequenceFiles, array: np.ndarray, dtype: str, shape: tuple[str | int, ...]) -> str:
+def _fault(files: SequenceFiles, name: str, array: np.ndarray, dtype: str, shape: tuple[str | int, ...]) -> str:
     if str(array.dtype) != dtype:
         return f"must be {dtype}, and is {array.dtype}"
-    wanted = tuple(files.lengths.get(length, length) if isinstance(length, str) else length for length in shape)
+    # Views may differ in size, so an image's sides are settled view by view.
+    keys = [f"{name.partition('/')[0]}/{length}" if length in ("H", "W") else length for length in shape]
+    wanted = tuple(files.lengths.get(key, key) if isinstance(key, str) else key for key in keys)
     fits = array.ndim == len(shape) and all(
         isinstance(want, str) or want == have for want, have in zip(wanted, array.shape, strict=True)
     )
@@ -102,10 +145,9 @@ def _fault(files: SequenceFiles, array: np.ndarray, dtype: str, shape: tuple[str
         return f"must have shape ({', '.join(map(str, wanted))}), and has {array.shape}"
     if not array.flags.c_contiguous:
         return "must be in C order"
-    for letter, have in zip(shape, array.shape, strict=True):
-        # Views may differ in size, so an image's sides are settled view by view.
-        if isinstance(letter, str) and letter not in "HW":
-            files.lengths[letter] = have
+    files.lengths |= {key: have for key, have in zip(keys, array.shape, strict=True) if isinstance(key, str)}
+    if "F" in files.lengths:
+        files.lengths["E"] = files.lengths["F"] - 1
     return ""
 
 

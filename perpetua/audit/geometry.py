@@ -26,6 +26,25 @@ def camera_centre_m(camera_from_world: Float[np.ndarray, "4 4"]) -> Float64[np.n
     return np.asarray(-pose[:3, :3].T @ pose[:3, 3])
 
 
+def unproject_depth(
+    intrinsics_px: Float[np.ndarray, "4"], depth_m: Float[np.ndarray, "H W"]
+) -> Float64[np.ndarray, "H W 3"]:
+    """What each pixel centre shows, in the camera's axes."""
+    fx, fy, cx, cy = np.asarray(intrinsics_px, np.float64)
+    height, width = depth_m.shape
+    row, column = np.mgrid[:height, :width]
+    depth = np.asarray(depth_m, np.float64)
+    return np.stack([(column - cx) / fx * depth, (row - cy) / fy * depth, depth], axis=-1)
+
+
+def to_world(
+    camera_from_world: Float[np.ndarray, "4 4"], camera_m: Float64[np.ndarray, "*shape 3"]
+) -> Float64[np.ndarray, "*shape 3"]:
+    """Points of a camera in the world, if its transform is rigid."""
+    pose = np.asarray(camera_from_world, np.float64)
+    return np.asarray((camera_m - pose[:3, 3]) @ pose[:3, :3])
+
+
 def depth_of_planes(
     intrinsics_px: Float[np.ndarray, "4"],
     camera_from_world: Float[np.ndarray, "4 4"],

@@ -14,6 +14,7 @@ from synthetic_sequence import write_scene
 from perpetua.audit.config import AuditConfig
 from perpetua.audit.verify import find_sequences, verify_sequence
 from perpetua.errors import SequenceFormatError
+from perpetua.formats.config import OUTPUTS
 
 BOUNDS = AuditConfig()
 Fault = Callable[[Path], None]
@@ -21,8 +22,9 @@ Fault = Callable[[Path], None]
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """With all labels that there are."""
     folder = tmp_path_factory.mktemp("good") / "sequence"
-    write_scene(folder)
+    write_scene(folder, OUTPUTS)
     return folder
 
 
@@ -165,6 +167,31 @@ def both(*faults: Fault) -> Fault:
     return plant
 
 
+def turn_into_world(folder: Path) -> None:
+    """Normals in the axes of the world."""
+    normal, pose = np.load(folder / "0/normals.npy"), np.load(folder / "0/extrinsics_w2c.npy")
+    np.save(folder / "0/normals.npy", np.einsum("fji,fhwj->fhwi", pose[:, :3, :3], normal))
+
+
+def shifted(metres: float) -> Callable[[np.ndarray], None]:
+    """Transforms with another translation."""
+
+    def alter(poses: np.ndarray) -> None:
+        poses[..., :3, 3] += np.float32(metres)
+
+    return alter
+
+
+def drift(poses: np.ndarray) -> None:
+    """One thing creeps by a tenth of a millimetre."""
+    poses[:, 2, 0, 3] += np.linspace(0.0, 1e-4, len(poses), dtype=np.float32)
+
+
+def other_way(name: str) -> Fault:
+    """Flow that leads back: from where points are to where they were."""
+    return change(name, lambda a: -a)
+
+
 # Fault, the check that must catch it, and what its message must name.
 FAULTS: dict[str, tuple[Fault, str, str]] = {
     "queries half a pixel off": (
@@ -272,6 +299,108 @@ FAULTS: dict[str, tuple[Fault, str, str]] = {
         r"tracks_xyz.npy\[:, \d+\]",
     ),
     "nothing moves": (shrug_dynamic, "moving tracks", "0.0% of tracks move"),
+    "images of two frames swapped": (
+        images(lambda a: a[[4, 1, 2, 3, 0, 5]]),
+        "images of their frames",
+        r"1/images_jpeg_bytes.npy\[(0|4)\] fits frame (4|0) better",
+    ),
+    "images one frame late": (images(lambda a: np.roll(a, 1)), "images of their frames", "fits frame"),
+    "images of views swapped": (
+        swap("0/images_jpeg_bytes.npy", "1/images_jpeg_bytes.npy"),
+        "images of their frames",
+        "of views 0 and 2",
+    ),
+    "a camera that stands elsewhere": (
+        change("2/extrinsics_w2c.npy", shifted(0.3)),
+        "views agree",
+        "sees through",
+    ),
+    "pixels of tracks half a pixel off": (
+        change("2/tracks_xy.npy", lambda a: a + np.float32(0.5)), "track pixels", r"2/tracks_xy.npy\[0, 0\]"
+    ),
+    "pixels of tracks one frame late": (
+        change("2/tracks_xy.npy", lambda a: np.roll(a, 1, axis=0)), "track pixels", r"2/tracks_xy.npy\[0, "
+    ),
+    "pixels of tracks x for y": (
+        change("0/tracks_xy.npy", lambda a: np.ascontiguousarray(a[..., ::-1])), "track pixels", "and its track is at"
+    ),
+    "one pixel of a track missing": (assign("1/tracks_xy.npy", (3, 7), np.nan), "track pixels", r"\[3, 7\] is \[nan"),
+    "poses one frame late": (
+        change("object_poses.npy", lambda a: np.roll(a, 1, axis=0)), "object poses", "out of object_boxes.npy"
+    ),
+    "poses transposed": (
+        change("object_poses.npy", lambda a: np.ascontiguousarray(a.swapaxes(2, 3))), "object poses", "rigid"
+    ),
+    "poses from world to object": (
+        change("object_poses.npy", lambda a: np.linalg.inv(a).astype("f4")), "object poses", "out of object_boxes"
+    ),
+    "poses of objects swapped": (
+        change("object_poses.npy", lambda a: np.ascontiguousarray(a[:, [0, 2, 1, 3, 4, 5]])),
+        "object poses",
+        "out of object_boxes",
+    ),
+    "a pose too few": (change("object_poses.npy", lambda a: a[:, 1:]), "layout", "object_boxes.npy must have shape"),
+    "furniture that moves": (
+        change("object_poses.npy", drift),
+        "object poses",
+        r"object_poses.npy\[:, 2\] moves",
+    ),
+    "object index of views swapped": (
+        swap("0/object_index.npy", "1/object_index.npy"), "object index", "foreground_mask.npy says otherwise"
+    ),
+    "object index one frame late": (
+        change("1/object_index.npy", lambda a: np.roll(a, 1, axis=0)), "object index", r"1/object_index.npy\[0, "
+    ),
+    "object index of things mixed up": (
+        change("1/object_index.npy", lambda a: np.array([0, 3, 2, 1, 4, 5, 6], np.uint16)[a]),
+        "object index of tracks",
+        "shows other objects",
+    ),
+    "an object that nobody listed": (
+        assign("1/object_index.npy", (2, 4, 5), 99), "object index", r"\[2, 4, 5\] is an object that sequence.json"
+    ),
+    "normals of the other side": (change("0/normals.npy", lambda a: -a), "normals", "faces away"),
+    "normals in the world's axes": (turn_into_world, "normals", r"0/normals.npy\[0, "),
+    "normals of Blender's camera": (
+        change("0/normals.npy", lambda a: a * np.array([1, -1, 1], "f4")), "normals", "not normal to the plane"
+    ),
+    "normals one frame late": (
+        change("0/normals.npy", lambda a: np.roll(a, 1, axis=0)), "normals", "not normal to the plane"
+    ),
+    "normals of no length": (change("1/normals.npy", lambda a: a * np.float32(0.99)), "normals", "must have length 1"),
+    "normals missing": (assign("1/normals.npy", (2, slice(0, 30)), 0), "normals", "has no normal"),
+    "normals in 16 bits": (change("1/normals.npy", lambda a: a.astype("f2")), "layout", "must be float32"),
+    "flow the other way": (other_way("0/flow.npy"), "flow", "is not where depth and cameras take"),
+    "flow half a pixel off": (change("0/flow.npy", lambda a: a + np.float32(0.5)), "flow", "is not where depth"),
+    "flow y before x": (
+        change("1/flow.npy", lambda a: np.ascontiguousarray(a[..., ::-1])), "flow of tracks", "its own way in the image"
+    ),
+    "flow one frame late": (change("1/flow.npy", lambda a: np.roll(a, 1, axis=0)), "flow", "is not where depth"),
+    "flow for one frame too many": (change("1/flow.npy", lambda a: a[[0, 1, 2, 3, 4, 4]]), "layout", "flow.npy must"),
+    "flow of what nothing shows": (assign("2/flow_state.npy", (1, slice(0, 20)), 0), "flow", "state 0"),
+    "all flow called seen": (
+        change("2/flow_state.npy", lambda a: np.minimum(a, 1)), "flow", "state that does not fit"
+    ),
+    "hidden flow called seen": (
+        change("0/flow_to_1_state.npy", lambda a: np.where(a == 2, 1, a).astype("u1")),
+        "view flow against depth",
+        "is called seen",
+    ),
+    "seen flow called hidden": (
+        change("0/flow_to_1_state.npy", lambda a: np.where(a == 1, 2, a).astype("u1")),
+        "view flow against depth",
+        "is called hidden",
+    ),
+    "flow to the wrong view": (swap("0/flow_to_1.npy", "0/flow_to_2.npy"), "view flow", r"0/flow_to_1.npy\[0, "),
+    "flow to views the other way": (other_way("2/flow_to_0.npy"), "view flow", "is not where depth and cameras"),
+    "no scene flow": (change("0/scene_flow.npy", np.zeros_like), "scene flow of tracks", "another scene flow"),
+    "scene flow in millimetres": (
+        change("0/scene_flow.npy", lambda a: a * np.float32(1000)), "scene flow of tracks", "another scene flow"
+    ),
+    "scene flow the other way": (other_way("1/scene_flow.npy"), "flow", "is not where depth and cameras take"),
+    "walls that flow": (
+        assign("1/scene_flow.npy", (3, slice(0, 3)), 1e-6), "scene flow", "foreground_mask.npy shows no actor"
+    ),
     "surfaces of other tracks": (
         change("surface_xyz.npy", lambda a: np.roll(a, 1, axis=1)),
         "on surface",
@@ -280,12 +409,21 @@ FAULTS: dict[str, tuple[Fault, str, str]] = {
 }  # fmt: skip
 
 
+CHECKS = {
+    "layout", "values", "images", "cameras", "sha256", "query pixels", "query draw", "track pixels", "object poses",
+    "moving tracks", "static tracks", "on surface", "visible on image", "depth agreement", "foreground agreement",
+    "hidden for a reason", "images of their frames", "views agree", "object index", "object index of tracks", "normals",
+    "normals of tracks", "flow", "flow against depth", "flow of tracks", "view flow", "view flow against depth",
+    "view flow of tracks", "scene flow", "scene flow of tracks",
+}  # fmt: skip
+
+
 def test_good_data_passes(good: Path) -> None:
     report = verify_sequence(good, BOUNDS)
     assert report.passed and not report.skipped, [str(check) for check in report.checks if not check.passed]
-    assert len(report.checks) == 14
+    assert {check.name for check in report.checks} == CHECKS
     assert json.loads(json.dumps(report.to_json(), allow_nan=False))["passed"] is True
-    assert report.table().row_count == 14
+    assert report.table().row_count == len(CHECKS)
 
 
 def test_unsound_but_good_looking_files_would_be_noticed(good: Path) -> None:
@@ -307,7 +445,12 @@ def test_planted_fault_is_caught(sequence: Path, name: str) -> None:
 
 
 def test_hashes_catch_what_no_other_check_sees(sequence: Path) -> None:
-    images(lambda jpegs: np.roll(jpegs, 1))(sequence)
+    """A comment in a JPEG file changes no pixel."""
+
+    def comment(jpegs: np.ndarray) -> None:
+        jpegs[2] = np.concatenate([jpegs[2][:2], np.frombuffer(b"\xff\xfe\x00\x04ab", np.uint8), jpegs[2][2:]])
+
+    images(comment)(sequence)
     assert failed_checks(sequence) == {"sha256": "1/images_jpeg_bytes.npy does not have the recorded sha256"}
 
 
@@ -318,15 +461,49 @@ def test_a_record_that_names_files_elsewhere_is_refused(sequence: Path) -> None:
     assert "leads out of the folder" in failed_checks(sequence)["sha256"]
 
 
+LABELS = ("object_index", "normals", "flow", "flow_state", "scene_flow", "flow_to_0", "flow_to_1", "flow_to_2",
+          "flow_to_0_state", "flow_to_1_state", "flow_to_2_state", "tracks_xy")  # fmt: skip
+
+
+def strip(sequence: Path) -> None:
+    """Leaves what others have too."""
+    for name in ("sequence.json", "surface_xyz.npy", "object_poses.npy", "object_boxes.npy"):
+        (sequence / name).unlink()
+    for view in range(3):
+        for name in LABELS:
+            (sequence / f"{view}/{name}.npy").unlink(missing_ok=True)
+
+
 def test_data_from_elsewhere_is_verified_as_far_as_it_goes(sequence: Path) -> None:
-    (sequence / "sequence.json").unlink()
-    (sequence / "surface_xyz.npy").unlink()
+    strip(sequence)
     report = verify_sequence(sequence, BOUNDS)
-    assert report.passed
-    assert "depth agreement of points" in {check.name for check in report.checks}
-    assert len(report.skipped) == 2
+    assert report.passed, [str(check) for check in report.checks if not check.passed]
+    assert {"depth agreement of points", "views agree", "images of their frames"} <= {c.name for c in report.checks}
+    assert len(report.skipped) == 3
     ray_length(sequence)
-    assert "depth agreement of points" in failed_checks(sequence)
+    assert {"depth agreement of points", "views agree"} <= set(failed_checks(sequence))
+
+
+def test_data_without_depth_and_masks_has_its_tracks_verified(sequence: Path) -> None:
+    strip(sequence)
+    for view in range(3):
+        (sequence / f"{view}/depth.npy").unlink()
+        (sequence / f"{view}/foreground_mask.npy").unlink()
+    report = verify_sequence(sequence, BOUNDS)
+    assert report.passed and any(line.startswith("depth agreement, views agree, labels") for line in report.skipped)
+    swap("0/extrinsics_w2c.npy", "1/extrinsics_w2c.npy")(sequence)
+    assert {"query pixels", "images of their frames"} <= set(failed_checks(sequence))
+
+
+def test_labels_are_verified_without_a_record(sequence: Path) -> None:
+    """Labels of others count too, with no table of objects and no triangles under tracks."""
+    for name in ("sequence.json", "surface_xyz.npy"):
+        (sequence / name).unlink()
+    report = verify_sequence(sequence, BOUNDS)
+    assert report.passed, [str(check) for check in report.checks if not check.passed]
+    assert {"object index", "normals", "flow", "view flow", "scene flow"} <= {check.name for check in report.checks}
+    other_way("0/flow.npy")(sequence)
+    assert "flow" in failed_checks(sequence)
 
 
 def test_sequences_are_found_below_a_folder(good: Path, tmp_path: Path) -> None:

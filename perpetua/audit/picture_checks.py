@@ -1,0 +1,117 @@
+"""Checks that images belong where they are: tracks keep their colours from image to image and from view to view.
+
+The colour of a track is the median over the images of a view that show it. An image that was put at another frame shows
+other colours at that frame's tracks, and the image that belongs there shows the right ones.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float32, Float64, UInt8
+
+from perpetua.audit.files import SequenceFiles
+from perpetua.audit.geometry import project_to_pixels
+from perpetua.audit.report import Check
+
+# The first tracks are a fair sample.
+TRACKS = 1024
+# Fewer visible tracks say nothing about an image.
+FEWEST = 24
+# Another image fits a frame better when its colours are off by less than this share of the own image's, and by at least
+# so much less; colours are natural logarithms.
+BETTER_SHARE, BETTER_BY = 0.55, 0.01
+# Colours of tracks that two views see have at least this correlation.
+LEAST_CORRELATION = 0.3
+
+
+@dataclass(frozen=True)
+class _View:
+    """What one view's images show at its tracks; ``colour`` is NaN for tracks that the view never shows."""
+
+    name: str
+    pixel_px: Float32[np.ndarray, "F P 2"]
+    visible: Bool[np.ndarray, "F P"]
+    colour: Float64[np.ndarray, "P 3"]
+
+
+def check_pictures(files: SequenceFiles) -> Check:
+    """No image fits another frame of its view much better than the image that is there, and views agree on colours."""
+    faults: list[str] = []
+    worst = 0.0
+    views = [_look(files, view) for view in files.views]
+    for view in views:
+        error = _errors(files, view)
+        for frame in np.flatnonzero(view.visible.sum(axis=1) >= FEWEST).tolist():
+            best = int(error[:, frame].argmin())
+            own, other = float(error[frame, frame]), float(error[best, frame])
+            worst = max(worst, 1.0 - other / max(own, 1e-9) if own - other > BETTER_BY else 0.0)
+            if other < BETTER_SHARE * own and own - other > BETTER_BY:
+                faults.append(f"{view.name}/images_jpeg_bytes.npy[{best}] fits frame {frame} better than its own image")
+    faults += _strangers(views)
+    bound = f"no image {1.0 - BETTER_SHARE:.0%} better elsewhere, colours of views correlate by {LEAST_CORRELATION:g}"
+    return Check("images of their frames", not faults, worst, bound, "; ".join(faults[:3]))
+
+
+def _look(files: SequenceFiles, name: str) -> _View:
+    tracks = files.arrays["tracks_xyz.npy"][:, :TRACKS]
+    visible = np.asarray(files.arrays[f"{name}/visibility.npy"][:, :TRACKS])
+    pixel_px = np.empty((*visible.shape, 2), np.float32)
+    shown = np.full((*visible.shape, 3), np.nan, np.float32)
+    for frame in range(len(tracks)):
+        camera = files.arrays[f"{name}/intrinsics.npy"], files.arrays[f"{name}/extrinsics_w2c.npy"][frame]
+        seen = project_to_pixels(*camera, tracks[frame])[:, :2]
+        pixel_px[frame] = np.nan_to_num(seen, nan=0.0).clip(0.0, 16_000.0)
+        at = np.flatnonzero(visible[frame])
+        shown[frame, at] = _sample(_decode(files.jpegs[name][frame]), pixel_px[frame, at])
+    colour = np.full((visible.shape[1], 3), np.nan)
+    known = visible.any(axis=0)
+    colour[known] = np.nanmedian(shown[:, known], axis=0)
+    return _View(name, pixel_px, visible, colour)
+
+
+def _errors(files: SequenceFiles, view: _View) -> Float64[np.ndarray, "F F"]:
+    """How far colours of an image (first axis) are from the colours of the tracks visible at a frame, in the median
+    and apart from its brightness."""
+    frame, track = np.nonzero(view.visible)
+    ends = np.cumsum(view.visible.sum(axis=1))[:-1]
+    error = np.full((len(view.visible), len(view.visible)), np.inf)
+    for image, jpeg in enumerate(files.jpegs[view.name]):
+        off = _sample(_decode(jpeg), view.pixel_px[frame, track]) - view.colour[track]
+        for at, part in enumerate(np.split(off, ends)):
+            if len(part):
+                error[image, at] = np.median(np.abs(part - np.median(part, axis=0)).mean(axis=1))
+    return error
+
+
+def _strangers(views: list[_View]) -> list[str]:
+    """Pairs of views whose common tracks have other colours in each."""
+    faults = []
+    for place, first in enumerate(views):
+        for second in views[place + 1 :]:
+            both = np.isfinite(first.colour).all(axis=1) & np.isfinite(second.colour).all(axis=1)
+            seen = np.stack([first.colour[both].ravel(), second.colour[both].ravel()])
+            if both.sum() >= FEWEST and (seen.std(axis=1) > 0.1).all():
+                correlation = float(np.corrcoef(seen)[0, 1])
+                if correlation < LEAST_CORRELATION:
+                    faults.append(
+                        f"images_jpeg_bytes.npy of views {first.name} and {second.name}: colours of the {both.sum()} "
+                        f"tracks that both see correlate by {correlation:.2f}"
+                    )
+    return faults
+
+
+def _decode(jpeg: UInt8[np.ndarray, " _"]) -> Float32[np.ndarray, "H W 3"]:
+    return np.log1p(cv2.imdecode(jpeg, cv2.IMREAD_COLOR).astype(np.float32))
+
+
+def _sample(image: Float32[np.ndarray, "H W 3"], pixel_px: Float32[np.ndarray, "N 2"]) -> Float32[np.ndarray, "N 3"]:
+    """Colours between pixel centres; OpenCV takes at most 32,767 places to a row."""
+    if len(pixel_px) == 0:
+        return np.zeros((0, 3), np.float32)
+    columns = [part for start in range(0, len(pixel_px), 16_384) for part in [pixel_px[start : start + 16_384]]]
+    found = [
+        cv2.remap(image, part[None, :, 0], part[None, :, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
+        for part in columns
+    ]
+    return np.concatenate(found)

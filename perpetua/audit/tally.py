@@ -1,0 +1,56 @@
+"""Counts of entries that were tested and failed, with the first failure in words."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool
+
+from perpetua.audit.report import Check
+
+# Labels of pixels are looked at in so many frames of a sequence, at even distances.
+FRAMES_LOOKED_AT = 16
+
+
+def chosen_frames(count: int) -> list[int]:
+    """The frames of ``count`` that checks of every pixel look at."""
+    chosen: list[int] = np.unique(np.linspace(0, count - 1, min(count, FRAMES_LOOKED_AT)).round().astype(int)).tolist()
+    return chosen
+
+
+@dataclass
+class Tally:
+    """Entries of one rule; ``words`` say what the rule is."""
+
+    words: str
+    least: float
+    tested: int = 0
+    failed: int = 0
+    first: str = ""
+
+    def add(self, name: str, failed: Bool[np.ndarray, "*any"], tested: Bool[np.ndarray, "*any"] | None = None) -> None:
+        """Counts entries of a file's frame, called ``name``; those not ``tested`` do not count."""
+        bad = failed if tested is None else failed & tested
+        self.tested += failed.size if tested is None else int(tested.sum())
+        self.failed += int(bad.sum())
+        if bad.any() and not self.first:
+            place = ", ".join(str(index) for index in np.argwhere(bad)[0])
+            self.first = f"{name}, {place}]"
+
+    @property
+    def share(self) -> float:
+        """The share of entries that keep the rule."""
+        return 1.0 - self.failed / max(self.tested, 1)
+
+    @property
+    def fault(self) -> str:
+        """What is wrong; empty where enough entries keep the rule."""
+        if self.share >= self.least:
+            return ""
+        return f"{self.first} {self.words} ({self.failed} of {self.tested} entries)"
+
+
+def check_of(name: str, tallies: list[Tally]) -> Check:
+    """One check of several rules; its value is the lowest share."""
+    faults = [tally.fault for tally in tallies if tally.fault]
+    bound = f">= {min(tally.least for tally in tallies):g} of entries"
+    return Check(name, not faults, min(tally.share for tally in tallies), bound, "; ".join(faults[:3]))
