@@ -1,7 +1,7 @@
 """The one schema: each stage's section joined; read from YAML, then changed by ``--set a.b=c``."""
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,13 +45,28 @@ class Config(Section):
     redraw: RedrawConfig = Field(default_factory=RedrawConfig)
 
 
+# From the smallest to the largest.
+PRESETS = ("tiny", "quick", "standard", "benchmark")
+
+
 def presets() -> dict[str, Path]:
     """The presets that come with Perpetua: name -> YAML file."""
-    return {path.stem: path for path in sorted(PRESET_FOLDER.glob("*.yaml"))}
+    return {name: PRESET_FOLDER / f"{name}.yaml" for name in PRESETS}
 
 
-def load_config(preset: str | None = None, path: Path | None = None, assignments: Sequence[str] = ()) -> Config:
-    """The schema's defaults, then a preset, then a file, then assignments ``a.b=value`` (value in YAML).
+def load_config(
+    preset: str | None = None,
+    path: Path | None = None,
+    assignments: Sequence[str] = (),
+    changes: Mapping[str, Any] | None = None,
+) -> Config:
+    """The schema's defaults, then a preset, then a file, then changes.
+
+    Args:
+        preset: name of a preset.
+        path: a YAML file with any part of the schema.
+        assignments: changes as text, ``a.b=value``, the value in YAML.
+        changes: changes as values, ``{"a.b": value}``.
 
     Raises:
         ConfigError: an unknown preset, an unreadable file, an unknown key, or a value out of range.
@@ -60,12 +75,14 @@ def load_config(preset: str | None = None, path: Path | None = None, assignments
     if preset is not None:
         known = presets()
         if preset not in known:
-            raise ConfigError(f"--preset must be one of {sorted(known)}, not '{preset}'{_nearest(preset, known)}")
+            raise ConfigError(f"the preset must be one of {', '.join(known)}, not '{preset}'{_nearest(preset, known)}")
         _merge(settings, _read_yaml(known[preset]))
     if path is not None:
         _merge(settings, _read_yaml(path))
     for assignment in assignments:
         _merge(settings, _parse_assignment(assignment))
+    for key, value in (changes or {}).items():
+        _merge(settings, _nested(key, value))
     try:
         return Config.model_validate(settings)
     except ValidationError as error:
@@ -75,15 +92,27 @@ def load_config(preset: str | None = None, path: Path | None = None, assignments
 def _read_yaml(path: Path) -> dict[str, Any]:
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"cannot read config '{path}': {error}") from None
+    except OSError as error:
+        raise ConfigError(f"cannot read config '{path}': {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise ConfigError(f"cannot read config '{path}': it is not a text file in UTF-8") from None
     except yaml.YAMLError as error:
-        raise ConfigError(f"config '{path}' is not valid YAML: {error}") from None
+        raise ConfigError(f"config '{path}' is not valid YAML: {_yaml_problem(error)}") from None
     if content is None:
         return {}
     if not isinstance(content, dict):
         raise ConfigError(f"config '{path}' must be a mapping of keys to values, not {type(content).__name__}")
     return content
+
+
+def _yaml_problem(error: yaml.YAMLError) -> str:
+    """Line and problem in one sentence."""
+    if not isinstance(error, yaml.MarkedYAMLError) or error.problem_mark is None:
+        return str(error)
+    problem = str(error.problem)
+    if "'\\t'" in problem:
+        problem = "a tab stands where only spaces may: indent with spaces"
+    return f"line {error.problem_mark.line + 1}: {problem}"
 
 
 def _parse_assignment(assignment: str) -> dict[str, Any]:
@@ -93,7 +122,11 @@ def _parse_assignment(assignment: str) -> dict[str, Any]:
     try:
         value: Any = yaml.safe_load(text)
     except yaml.YAMLError as error:
-        raise ConfigError(f"--set {key}: '{text}' is not valid YAML: {error}") from None
+        raise ConfigError(f"--set {key}: '{text}' is not valid YAML: {_yaml_problem(error)}") from None
+    return _nested(key, value)
+
+
+def _nested(key: str, value: Any) -> dict[str, Any]:
     for part in reversed(key.strip().split(".")):
         value = {part: value}
     return dict(value)
@@ -119,46 +152,44 @@ def field_table(section: type[Section] = Config, prefix: str = "") -> dict[str, 
     return table
 
 
-def annotated_yaml(config: Config) -> str:
-    """Every setting as YAML, each with its meaning and range as a comment."""
-    return "\n".join(_annotated_lines(config, ""))
-
-
-def _annotated_lines(section: Section, indent: str) -> list[str]:
-    lines: list[str] = []
-    for name, field in type(section).model_fields.items():
-        value = getattr(section, name)
-        if isinstance(value, Section):
-            lines += [f"{indent}{name}:", *_annotated_lines(value, indent + "  ")]
-        else:
-            limits = ", ".join(_limit(rule) for rule in field.metadata)
-            text = yaml.safe_dump(section.model_dump(mode="json")[name], default_flow_style=True).split("\n")[0]
-            lines.append(f"{indent}{name}: {text}  # {field.description}" + (f" [{limits}]" if limits else ""))
-    return lines
-
-
-def _limit(rule: object) -> str:
-    """One bound of a field as people write it."""
-    signs = {"Ge": ">=", "Gt": ">", "Le": "<=", "Lt": "<"}
-    name = type(rule).__name__
-    if name in signs:
-        return f"{signs[name]} {getattr(rule, name.lower())}"
-    return str(rule)
-
-
-def _nearest(name: str, known: Mapping[str, Any]) -> str:
-    near = difflib.get_close_matches(name, list(known), n=1)
+def _nearest(name: str, known: Iterable[str]) -> str:
+    """A hint at what was meant; a key's last word alone counts as much as all of it."""
+    ends = {key.rpartition(".")[2]: key for key in reversed(list(known))}
+    lowered = {key.lower(): key for key in ends.values()} | {key.lower(): key for key in known}
+    last = name.rpartition(".")[2].lower()
+    near = [ends[last]] if last in ends else []
+    near += [lowered[key] for key in difflib.get_close_matches(name.lower(), lowered, n=1)]
+    near += [ends[end] for end in difflib.get_close_matches(last, ends, n=1)]
     return f"; did you mean '{near[0]}'?" if near else ""
+
+
+# What pydantic says of a wrong type, in plain words.
+_PLAIN_RULES = {
+    "int_parsing": "must be a whole number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "float_parsing": "must be a number",
+    "float_type": "must be a number",
+    "bool_parsing": "must be true or false",
+    "bool_type": "must be true or false",
+    "string_type": "must be text",
+    "tuple_type": "must be a list such as [a, b]",
+    "dict_type": "must be a mapping such as {a: 1}",
+}
 
 
 def _explain(error: Mapping[str, Any]) -> str:
     location = [str(part) for part in error["loc"]]
     key = ".".join(location)
+    table = field_table()
     if error["type"] == "extra_forbidden":
-        table = field_table()
         sections = {name.rpartition(".")[0]: "" for name in table}
-        return f"unknown config key '{key}'{_nearest(key, table | sections)}"
+        return f"unknown config key '{key}'{_nearest(key, table | sections) or '; `perpetua config` lists all'}"
+    if error["type"] in ("model_type", "model_attributes_type"):
+        first = next(name for name in table if name.startswith(f"{key}."))
+        return f"config key '{key}' is a section, not {error['input']!r}: set what is in it, such as {first}"
     rule = str(error["msg"]).removeprefix("Value error, ").replace("Input should be", "must be")
+    rule = _PLAIN_RULES.get(error["type"], rule)
     documented = ".".join(part for part in location if not part.isdigit())
-    meaning = field_table().get(documented, "")
+    meaning = table.get(documented, "")
     return f"config key '{key}' {rule}, not {error['input']!r}" + (f" ({meaning})" if meaning else "")

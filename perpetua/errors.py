@@ -67,3 +67,13 @@ class TrackError(StageError):
 
 class AuditError(StageError):
     """A finished sequence does not pass its own audit."""
+
+
+class GenerationError(PerpetuaError):
+    """Some rooms failed; ``failures`` has the reason of each, by room."""
+
+    def __init__(self, failures: dict[int, str], wanted: int, exit_code: int) -> None:
+        reasons = "\n".join(f"room {room}: {reason}" for room, reason in sorted(failures.items()))
+        super().__init__(f"{len(failures)} of {wanted} rooms failed:\n{reasons}")
+        self.failures = failures
+        self.exit_code = exit_code

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from perpetua.actors.assembly import check_people
 from perpetua.cluster.local import raise_on_sigterm, run_rooms
 from perpetua.cluster.outcome import RoomWork
 from perpetua.config import Config
@@ -21,7 +22,7 @@ from perpetua.pictures.contact_sheet import write_contact_sheet
 from perpetua.pipeline.cost import Cost, check_disk, estimate_cost, gigabytes
 from perpetua.pipeline.events import OnEvent
 from perpetua.pipeline.free_memory import free_memory_mb
-from perpetua.pipeline.layout import LOG_FILE, OutputLayout, open_run
+from perpetua.pipeline.layout import LOG_FILE, OutputLayout, check_writable, open_run
 from perpetua.pipeline.lease import hold
 from perpetua.pipeline.progress import Progress
 from perpetua.pipeline.runner import RoomRun
@@ -57,33 +58,60 @@ def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> i
         InputError: the request cannot be carried out as it stands.
     """
     say = _speaker(console)
-    until = _checked_stage(request.until)
-    require_libraries()
-    check_source(request.config.rooms)
+    until = check_request(request)
     cost = estimate_cost(request.config, len(request.rooms))
     free_bytes = check_disk(cost, request.out)
     _say_cost(request, cost, free_bytes, until, console)
     if dry_run:
         return 0
-    open_run(request.out, request.seed, request.rooms, request.config, request.replace)
-    work = RoomWork(partial(make_room, request, until), partial(room_folder, request), cost.room_memory_mb)
-    workers = request.workers
-    if workers == 0:
-        workers = auto_workers(len(request.rooms), request.device, free_memory_mb(), cost.room_memory_mb)
-        say(f"rooms made at a time on this machine: {workers}")
-    logging.getLogger("perpetua").setLevel(logging.INFO)
     raise_on_sigterm()
     try:
-        with Progress(request.out / LOG_FILE, len(request.rooms), request.config.cameras.count, console) as progress:
-            failures = run_rooms(request.rooms, workers, work, progress.show)
+        failures = make_rooms(request, until, console)
     except KeyboardInterrupt:
         say(f"stopped; what is done is kept. To go on, run the same command again:\n  {_this_command()}")
         return EXIT_INTERRUPTED
     _say_result(request, failures, until, console)
-    return _exit_code(request, failures)
+    return exit_code(request, failures)
 
 
-def _exit_code(request: GenerateRequest, failures: dict[int, str]) -> int:
+def check_request(request: GenerateRequest) -> str:
+    """Passes what can be carried out, as far as that can be told before the work begins; returns its last stage.
+
+    Raises:
+        InputError: a name is none of those known, or a library, a folder or a program is missing.
+    """
+    until = _checked_stage(request.until)
+    require_libraries()
+    check_source(request.config.rooms)
+    check_people(request.config.actors)
+    check_writable(request.out)
+    return until
+
+
+def make_rooms(request: GenerateRequest, until: str, console: Console) -> dict[int, str]:
+    """Takes the rooms through the stages, and shows how it goes.
+
+    Returns:
+        The reason of failure of each room that failed.
+
+    Raises:
+        InputError: the output folder was made with other settings, or cannot be written to.
+        KeyboardInterrupt: the user stopped the work; what is finished stays.
+    """
+    open_run(request.out, request.seed, request.rooms, request.config, request.replace)
+    memory_mb = estimate_cost(request.config, len(request.rooms)).room_memory_mb
+    work = RoomWork(partial(make_room, request, until), partial(room_folder, request), memory_mb)
+    workers = request.workers
+    if workers == 0:
+        workers = auto_workers(len(request.rooms), request.device, free_memory_mb(), memory_mb)
+        _speaker(console)(f"rooms made at a time on this machine: {workers}")
+    logging.getLogger("perpetua").setLevel(logging.INFO)
+    with Progress(request.out / LOG_FILE, len(request.rooms), request.config.cameras.count, console) as progress:
+        return run_rooms(request.rooms, workers, work, progress.show)
+
+
+def exit_code(request: GenerateRequest, failures: dict[int, str]) -> int:
+    """0 without failures, 2 if all were for something that the user gave, else 1."""
     if not failures:
         return 0
     layouts = [OutputLayout(request.out, request.config.export, request.seed, room) for room in failures]

@@ -6,13 +6,27 @@ import numpy as np
 
 from perpetua.actors.bodies import BODY_MODELS
 from perpetua.actors.bodies.source import Body
+from perpetua.actors.casting import action_descriptions
 from perpetua.actors.config import ActorsConfig
+from perpetua.actors.motion import MOTION_SOURCES
 from perpetua.actors.types import BODY_JOINTS, ActorMesh, BodyMotion, Skeleton
 from perpetua.errors import ActorError
 from perpetua.seeding import StageSeed
 
 # What is sat on: so far behind the hip joints, along this share of the thighs, and so far to either side.
 _BUTTOCK_M, _THIGH_SHARE, _HALF_WIDTH_M = 0.08, 0.7, 0.22
+
+
+def check_people(config: ActorsConfig) -> None:
+    """Passes a config whose body model, clothes, motion source and actions exist and have what they need.
+
+    Raises:
+        ConfigError: a name is none of those known.
+        AssetError: files or a program that one of them needs are missing.
+    """
+    BODY_MODELS[config.body]().check(config)
+    MOTION_SOURCES[config.motion.source]().check(config.motion)
+    action_descriptions(config.motion)
 
 
 def draw_bodies(config: ActorsConfig, seed: StageSeed) -> tuple[Body, ...]:

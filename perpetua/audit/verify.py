@@ -45,6 +45,8 @@ def find_sequences(folder: Path) -> list[Path]:
             return found
         if (folder / "0").is_dir() or (folder / RECORD_FILE).exists():
             return [folder]
+    if not folder.exists():
+        raise SequenceFormatError(f"'{folder}' does not exist: give a sequence folder, or a folder that holds some")
     raise SequenceFormatError(f"'{folder}' holds no sequence: a folder with tracks_xyz.npy is required")
 
 

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import click
 
-from perpetua.commands.options import wide_console
+from perpetua.commands.options import WholeNumber, wide_console
 from perpetua.config import Config
 from perpetua.errors import InputError
 
 
-@click.command()
+@click.command(short_help="Check finished sequences: layout, projection, depth, visibility.")
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--deep", is_flag=True, help="Also cast rays at the meshes, which the work area must still hold.")
-@click.option("--frames", type=click.IntRange(min=1), default=8, show_default=True, help="Frames that --deep looks at.")
+@click.option("--frames", type=WholeNumber(1), default=8, show_default=True, help="Frames that --deep looks at.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def verify(folders: tuple[Path, ...], deep: bool, frames: int, as_json: bool) -> None:
     """Check finished sequences: layout, projection, depth, visibility, queries.
@@ -37,7 +37,7 @@ def verify(folders: tuple[Path, ...], deep: bool, frames: int, as_json: bool) ->
     sys.exit(0 if all(report.passed for report in reports) else 1)
 
 
-@click.command()
+@click.command(short_help="Score the tracks that a tracker predicts.")
 @click.argument("paths", metavar="[PRED] DIR", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--baseline", type=click.Choice(("still", "flow")),
               help="Instead of PRED, score points that stay, or optical flow lifted with depth.")  # fmt: skip

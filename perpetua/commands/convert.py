@@ -4,13 +4,14 @@ from pathlib import Path
 
 import click
 
+from perpetua.commands.options import WholeNumber
 from perpetua.formats.config import OUTPUTS
 
 
-@click.command()
+@click.command(short_help="Write a finished sequence again with other tracks.")
 @click.argument("sequence", type=click.Path(path_type=Path))
-@click.option("--count", type=click.IntRange(min=1), default=1024, show_default=True, help="Tracks to draw.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Decides which.")
+@click.option("--count", type=WholeNumber(1), default=1024, show_default=True, help="Tracks to draw.")
+@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Decides which.")
 @click.option("--from-pixels", metavar="VIEW:FRAME:STEP", help="Follow every STEP-th pixel of an image instead.")
 @click.option("--label", "labels", type=click.Choice(OUTPUTS), multiple=True,
               help="Also write this label of every pixel. Can be given several times.")  # fmt: skip
@@ -27,7 +28,7 @@ def tracks(sequence: Path, count: int, seed: int, from_pixels: str | None, label
     click.echo(f"wrote {len(made.queries_xytv)} tracks to {out}")
 
 
-@click.command()
+@click.command(short_help="Write finished sequences in the layout of another reader.")
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--format", "export_format", metavar="NAME", required=True,
               help="kubric (multi-view, as MVTracker reads it), tapvid3d (one file per view) or rerun.")  # fmt: skip

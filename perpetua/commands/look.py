@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from perpetua.commands.options import DEVICE_OPTION
+from perpetua.commands.options import CONFIG_OPTION, DEVICE_OPTION, PRESET_OPTION, SET_OPTION, WholeNumber
 from perpetua.config import load_config
 from perpetua.errors import InputError
 
@@ -14,25 +14,22 @@ PICTURES = ("sheet", "video", "plan", "depth", "objects")
 PICTURE_SUFFIXES = (".png", ".jpg")
 
 
-@click.command()
+@click.command(short_help="Draw pictures of a sequence, of rooms or of people.")
 @click.argument("sequence", required=False, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path),
               help="Folder to write into; with --actors a picture, .png or .jpg.")  # fmt: skip
 @click.option("--only", type=click.Choice(PICTURES), multiple=True,
               help="Draw this alone. Can be given several times.")  # fmt: skip
-@click.option("--times", type=click.IntRange(1, 24), default=6, show_default=True, help="Frames that a sheet shows.")
-@click.option("--actors", type=click.IntRange(min=1), metavar="N",
+@click.option("--times", type=WholeNumber(1, 24), default=6, show_default=True, help="Frames that a sheet shows.")
+@click.option("--actors", type=WholeNumber(1), metavar="N",
               help="Instead of a sequence, draw the first N actors of a seed, standing and walking.")  # fmt: skip
-@click.option("--rooms", type=click.IntRange(min=1), metavar="N",
+@click.option("--rooms", type=WholeNumber(1), metavar="N",
               help="Instead of a sequence, a page of a seed's first N rooms, from above and from corners.")  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
-              help="With --actors or --rooms: their seed.")  # fmt: skip
-@click.option("--config", "config_path", type=click.Path(path_type=Path), help="With --actors or --rooms: a YAML file.")
-@click.option("--preset", metavar="NAME", default="standard", show_default=True,
-              help="With --actors or --rooms: settings to start from.")  # fmt: skip
-@click.option(
-    "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="With --actors or --rooms: change one setting."
-)
+@click.option("--seed", type=WholeNumber(0), default=0, show_default=True,
+              help="Seed of those rooms or actors.")  # fmt: skip
+@PRESET_OPTION
+@CONFIG_OPTION
+@SET_OPTION
 @DEVICE_OPTION
 def preview(
     sequence: Path | None,
@@ -57,7 +54,7 @@ def preview(
     objects  which object each pixel shows
 
     With --rooms, rooms are made as generate makes them, in a folder that a later generate with the same settings
-    goes on from.
+    goes on from. --seed, --preset, --config, --set and --device are for --rooms and --actors.
     """
     if (sequence is not None) + (actors is not None) + (rooms is not None) != 1:
         raise InputError("preview needs one of: the folder of a sequence, --actors N, --rooms N")
@@ -94,7 +91,7 @@ def _preview_sequence(sequence: Path, out: Path | None, only: tuple[str, ...], t
     write_previews(sequence, folder, only, times, click.echo)
 
 
-@click.command()
+@click.command(short_help="Look at a sequence in Rerun, or write a recording for it.")
 @click.argument("sequence", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.rrd",
               help="Write a recording instead of opening the viewer.")  # fmt: skip
@@ -123,7 +120,7 @@ def _has_display() -> bool:
     return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-@click.command()
+@click.command(short_help="Write a page about a data set: pictures, figures, checks, cost.")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("report.html"), show_default=True,
               help="HTML file to write.")  # fmt: skip

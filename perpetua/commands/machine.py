@@ -6,11 +6,15 @@ from pathlib import Path
 import click
 from rich.table import Table
 
-from perpetua.commands.options import OUT_OPTION, wide_console
-from perpetua.config import load_config, presets
+from perpetua.commands.options import CONFIG_OPTION, OUT_OPTION, PRESET_OPTION, SET_OPTION, wide_console
+from perpetua.config import load_config
+
+PROGRAM = "perpetua"
+COMPLETION_VARIABLE = "_PERPETUA_COMPLETE"
+SHELLS = ("bash", "zsh", "fish")
 
 
-@click.command()
+@click.command(short_help="List outside assets: present or missing, licence, use.")
 def assets() -> None:
     """List outside assets: present or missing, licence, and what is lost without them."""
     from perpetua.assets import asset_folder, load_manifest
@@ -24,7 +28,7 @@ def assets() -> None:
     click.echo(f"files are looked for in {asset_folder()} (set PERPETUA_ASSETS to change it)")
 
 
-@click.command()
+@click.command(short_help="Check this machine and say what to install.")
 @OUT_OPTION
 def doctor(out: Path) -> None:
     """Check this machine and say what to install. Exit code 1 if something needed is missing."""
@@ -41,10 +45,39 @@ def doctor(out: Path) -> None:
     sys.exit(1 if missing else 0)
 
 
-@click.command("config")
-@click.option("--preset", default="standard", show_default=True, help=f"One of {', '.join(presets())}.")
-def show_config(preset: str) -> None:
-    """Print every setting of a preset with its meaning, as YAML."""
-    from perpetua.config import annotated_yaml
+@click.command("config", short_help="Print every setting with its meaning, unit and range.")
+@PRESET_OPTION
+@CONFIG_OPTION
+@SET_OPTION
+@click.option("--format", "form", type=click.Choice(("yaml", "markdown")), default="yaml", show_default=True,
+              help="YAML, which --config reads again, or a page of tables.")  # fmt: skip
+def show_config(preset: str, config_path: Path | None, assignments: tuple[str, ...], form: str) -> None:
+    """Print every setting with its meaning, unit and range, and the values that generate would use.
 
-    click.echo(annotated_yaml(load_config(preset)))
+    The same --preset, --config and --set as for generate. `perpetua config > mine.yaml` is a start for a file of
+    your own; a file may name just the settings that it changes.
+    """
+    from perpetua.config_reference import annotated_yaml, markdown_page
+
+    config = load_config(preset, config_path, assignments)
+    click.echo(annotated_yaml(config) if form == "yaml" else markdown_page(config))
+
+
+@click.command(short_help="Print a script that completes commands in a shell.")
+@click.argument("shell", type=click.Choice(SHELLS))
+def completion(shell: str) -> None:
+    """Print a script with which a shell completes commands, options, presets, stages and settings.
+
+    \b
+    bash: perpetua completion bash >> ~/.bashrc
+    zsh:  perpetua completion zsh >> ~/.zshrc
+    fish: perpetua completion fish > ~/.config/fish/completions/perpetua.fish
+
+    It holds from the next shell on.
+    """
+    from click.shell_completion import get_completion_class
+
+    made = get_completion_class(shell)
+    assert made is not None
+    program = click.get_current_context().find_root().command
+    click.echo(made(program, {}, PROGRAM, COMPLETION_VARIABLE).source())

@@ -1,18 +1,67 @@
 """Options and output that several commands share."""
 
 from pathlib import Path
+from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 from rich.console import Console
 
+from perpetua.config import PRESETS, field_table
 from perpetua.rendering.devices import DEVICES
 
-DEVICE_OPTION = click.option(
-    "--device", type=click.Choice(DEVICES), default="auto", show_default=True, help="What Cycles renders on."
-)
+
+class WholeNumber(click.ParamType):
+    """A whole number with bounds, said as people say them: "must be 1 or more, not 0"."""
+
+    name = "N"
+
+    def __init__(self, least: int, most: int | None = None) -> None:
+        self.least, self.most = least, most
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        try:
+            number = int(value)
+        except (TypeError, ValueError):
+            self.fail(f"must be a whole number, not '{value}'", param, ctx)
+        if number < self.least or (self.most is not None and number > self.most):
+            bound = f"{self.least} or more" if self.most is None else f"{self.least} to {self.most}"
+            self.fail(f"must be {bound}, not {number}", param, ctx)
+        return number
+
+
+def _complete(names: Any) -> Any:
+    """Shell completion from a function that gives names with help texts."""
+
+    def items(context: click.Context, parameter: click.Parameter, typed: str) -> list[CompletionItem]:
+        return [CompletionItem(name, help=text) for name, text in names().items() if name.startswith(typed)]
+
+    return items
+
+
+def _settings() -> dict[str, str]:
+    return {f"{key}=": meaning for key, meaning in field_table().items()}
+
+
 OUT_OPTION = click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True,
     help="Output folder.",
+)  # fmt: skip
+PRESET_OPTION = click.option(
+    "--preset", metavar="NAME", default="standard", show_default=True,
+    shell_complete=_complete(lambda: dict.fromkeys(PRESETS, "")),
+    help=f"Settings to start from: {', '.join(PRESETS)}.",
+)  # fmt: skip
+CONFIG_OPTION = click.option(
+    "--config", "config_path", type=click.Path(path_type=Path), metavar="YAML", help="A file with settings."
+)
+SET_OPTION = click.option(
+    "--set", "assignments", metavar="KEY=VALUE", multiple=True, shell_complete=_complete(_settings),
+    help="Change one setting, for example --set sequence.frames=48. Can be given several times.",
+)  # fmt: skip
+DEVICE_OPTION = click.option(
+    "--device", type=click.Choice(DEVICES), default="auto", show_default=True, metavar="NAME",
+    help=f"What Cycles renders on: {', '.join(DEVICES)}.",
 )  # fmt: skip
 
 

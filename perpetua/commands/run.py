@@ -7,26 +7,40 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from perpetua.commands.options import DEVICE_OPTION, OUT_OPTION, WorkerCount, wide_console
+from perpetua.commands.options import (
+    CONFIG_OPTION,
+    DEVICE_OPTION,
+    OUT_OPTION,
+    PRESET_OPTION,
+    SET_OPTION,
+    WholeNumber,
+    WorkerCount,
+    wide_console,
+)
 from perpetua.config import load_config
 
 
-@click.command()
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Decides everything drawn.")
-@click.option("--rooms", type=click.IntRange(min=1), default=1, show_default=True, help="How many sequences to make.")
-@click.option("--start-room", type=click.IntRange(min=0), default=0, show_default=True, help="Index of the first room.")
-@click.option("--until", metavar="STAGE", help="Stop after this stage, for example 'cameras'.")
+def _complete_stages(context: click.Context, parameter: click.Parameter, typed: str) -> list[str]:
+    from perpetua.pipeline.stages import STAGE_NAMES
+
+    return [name for name in STAGE_NAMES if name.startswith(typed)]
+
+
+@click.command(short_help="Make sequences: rooms, people, cameras, video, tracks.")
+@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Decides everything drawn.")
+@click.option("--rooms", type=WholeNumber(1), default=1, show_default=True, help="How many sequences to make.")
+@click.option("--start-room", type=WholeNumber(0), default=0, show_default=True, help="Index of the first room.")
 @OUT_OPTION
-@click.option("--config", "config_path", type=click.Path(path_type=Path), help="A YAML file with settings.")
-@click.option("--preset", metavar="NAME", default="standard", show_default=True,
-              help="Settings to start from: tiny, quick, standard or benchmark.")  # fmt: skip
-@click.option("--set", "assignments", metavar="KEY=VALUE", multiple=True,
-              help="Change one setting, for example --set sequence.frames=48. Can be given several times.")  # fmt: skip
+@PRESET_OPTION
+@CONFIG_OPTION
+@SET_OPTION
+@click.option("--until", metavar="STAGE", shell_complete=_complete_stages,
+              help="Stop after this stage, for example 'cameras'.")  # fmt: skip
 @click.option("--workers", type=WorkerCount(), default=1, show_default=True,
               help="Rooms made at a time; auto: one per GPU, or per four cores, as memory allows.")  # fmt: skip
 @DEVICE_OPTION
 @click.option("--replace", is_flag=True, help="Allow other settings than the ones the output folder was made with.")
-@click.option("--dry-run", is_flag=True, help="Say what would be done and what it costs, and do nothing.")
+@click.option("--dry-run", is_flag=True, help="Check everything, say what it takes, and do nothing.")
 def generate(
     seed: int,
     rooms: int,
@@ -41,10 +55,12 @@ def generate(
     replace: bool,
     dry_run: bool,
 ) -> None:
-    """Make sequences: rooms, actors, cameras, video, tracks.
+    """Make sequences: rooms, people, cameras, video, tracks.
 
     Stopped at any moment, the same command goes on where it was. Room k of a seed is the same however many rooms
     are made, in whichever order.
+
+    Exit codes: 0 all rooms are made, 1 some failed, 2 something in the command is wrong, 130 stopped.
     """
     from perpetua.generation import GenerateRequest, run_generate
 
@@ -52,8 +68,8 @@ def generate(
         config=load_config(preset, config_path, assignments),
         seed=seed,
         rooms=range(start_room, start_room + rooms),
-        until=until,
         out=out,
+        until=until,
         workers=workers,
         device=device,
         replace=replace,
@@ -61,7 +77,7 @@ def generate(
     sys.exit(run_generate(request, Console(), dry_run))
 
 
-@click.command()
+@click.command(short_help="How far an output folder is: rooms by stages, failures, time left.")
 @OUT_OPTION
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def status(out: Path, as_json: bool) -> None:
@@ -77,7 +93,7 @@ def status(out: Path, as_json: bool) -> None:
             click.echo(line)
 
 
-@click.command()
+@click.command(short_help="Free the work area of finished rooms; sequences stay.")
 @OUT_OPTION
 @click.option("--all", "unfinished", is_flag=True, help="Also the work of rooms that are not finished.")
 def clean(out: Path, unfinished: bool) -> None:

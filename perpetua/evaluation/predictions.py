@@ -38,7 +38,7 @@ GEOMETRY_PIXELS, GEOMETRY = "geometry_pixels_xytv", "geometry_xyz_world"
 KINDS = {CAMERA: "f", WORLD: "f", VISIBILITY: "b", INDEX: "iu", GEOMETRY_PIXELS: "iu", GEOMETRY: "f"}
 KIND_NAMES = {"f": "floating point", "b": "bool", "iu": "integer"}
 MOST_GEOMETRY = 5_000_000
-EXAMPLE = "the docstring of perpetua.evaluation.predictions describes the file"
+EXAMPLE = "`perpetua evaluate --help` describes the file"
 
 
 @dataclass(frozen=True)

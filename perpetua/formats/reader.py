@@ -67,6 +67,7 @@ def read_sequence(folder: Path) -> Sequence:
     Raises:
         SequenceFormatError: a file is missing, damaged, or not of the layout's type and shape.
     """
+    require_sequence(folder)
     tracks_m = read_array(folder, layout.TRACKS, np.float32, (None, None, 3))
     frames, count, _ = tracks_m.shape
     queries = read_array(folder, layout.QUERIES, np.float32, (count, 4))
@@ -74,6 +75,21 @@ def read_sequence(folder: Path) -> Sequence:
     if not names:
         raise SequenceFormatError(f"'{folder}' has no view: folders 0, 1, 2, ... are required")
     return Sequence(folder, tracks_m, queries, tuple(read_view(folder, name, frames, count) for name in names))
+
+
+def require_sequence(folder: Path) -> None:
+    """Passes the folder of a sequence.
+
+    Raises:
+        SequenceFormatError: it is none; where some lie below it the message names one.
+    """
+    if not folder.is_dir():
+        state = "is a file" if folder.exists() else "does not exist"
+        raise SequenceFormatError(f"'{folder}' {state}; the folder of a sequence is required")
+    if not (folder / layout.TRACKS).exists():
+        below = sorted(folder.glob(f"*/{layout.TRACKS}")) + sorted(folder.glob(f"*/*/{layout.TRACKS}"))
+        hint = f"; did you mean '{below[0].parent}'?" if below else ""
+        raise SequenceFormatError(f"'{folder}' is not the folder of a sequence: it has no {layout.TRACKS}{hint}")
 
 
 def view_names(folder: Path) -> list[str]:
@@ -125,6 +141,8 @@ def read_array(
     path = _inside(folder, name)
     try:
         array = np.load(path, mmap_mode="r" if on_disk else None, allow_pickle=False)
+    except FileNotFoundError:
+        raise SequenceFormatError(f"'{path}' is missing: the sequence is not whole") from None
     except (OSError, ValueError, EOFError) as error:
         raise SequenceFormatError(f"cannot read '{path}': {error}") from None
     fits = len(array.shape) == len(shape) and all(

@@ -10,6 +10,7 @@ from jaxtyping import UInt16
 from perpetua.actors.types import Route
 from perpetua.audit.deep_scene import DeepScene
 from perpetua.errors import InputError
+from perpetua.formats.reader import require_sequence
 from perpetua.formats.source import KeptMeshes
 from perpetua.pipeline import codec
 from perpetua.pipeline.layout import WORK_FOLDER, RunRecord, read_run
@@ -32,8 +33,10 @@ def load_kept_scene(sequence_folder: Path) -> KeptScene:
     """Reads the stages from the work area of the run that made a sequence.
 
     Raises:
+        SequenceFormatError: it is no sequence.
         InputError: the sequence does not lie in its run's output folder, or its work area was freed.
     """
+    require_sequence(sequence_folder)
     work = _work_folder(sequence_folder)
     if not work.is_dir():
         raise InputError(

@@ -1,6 +1,7 @@
 """Where a run keeps what: the one place that knows the names below the output folder."""
 
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -93,6 +94,21 @@ def read_run(out: Path) -> RunRecord:
         raise InputError(f"'{path}' cannot be read: {error}") from None
 
 
+def check_writable(out: Path) -> None:
+    """Passes an output folder that is there, or can be made, and takes files.
+
+    Raises:
+        InputError: a file stands in the way, or the user may not write there.
+    """
+    place = out.absolute()
+    while not place.exists():
+        place = place.parent
+    if not place.is_dir():
+        raise InputError(f"--out '{out}' cannot be a folder, as '{place}' is a file: choose another --out")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise InputError(f"--out '{out}' cannot be written: you may not write to '{place}': choose another --out")
+
+
 def open_run(out: Path, seed: int, rooms: range, config: Config, replace: bool) -> RunRecord:
     """Records the rooms asked for; an output folder keeps one seed and one config, so nothing is overwritten.
 
@@ -104,7 +120,7 @@ def open_run(out: Path, seed: int, rooms: range, config: Config, replace: bool) 
         with hold_when_free(out / WORK_FOLDER):
             return _record_rooms(out, seed, rooms, config, replace)
     except OSError as error:
-        raise InputError(f"cannot write to --out '{out}': {error}") from None
+        raise InputError(f"cannot write to --out '{out}': {error.strerror}") from None
 
 
 def _record_rooms(out: Path, seed: int, rooms: range, config: Config, replace: bool) -> RunRecord:

@@ -38,22 +38,25 @@ class InfinigenRooms:
     """
 
     def draws(self, config: RoomsConfig) -> int | None:
-        """Without end."""
-        return None
-
-    def make(self, wish: RoomWish, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
-        """A room as wished, with its ``room.blend`` in ``scratch``.
+        """Without end.
 
         Raises:
             EnvironmentSetupError: Infinigen 2 is not installed.
-            RoomRejected: the generator crashed, took longer than ``rooms.timeout_s`` or more than
-                ``rooms.max_memory_mb``.
         """
         if importlib.util.find_spec("infinigen2") is None:
             raise EnvironmentSetupError(
                 "rooms.source 'infinigen' needs the package infinigen2, which is not installed: run "
                 "pip install 'perpetua[infinigen]', or choose rooms.source=procedural"
             )
+        return None
+
+    def make(self, wish: RoomWish, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:
+        """A room as wished, with its ``room.blend`` in ``scratch``.
+
+        Raises:
+            RoomRejected: the generator crashed, took longer than ``rooms.timeout_s`` or more than
+                ``rooms.max_memory_mb``.
+        """
         folder = scratch.resolve() / "infinigen"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)

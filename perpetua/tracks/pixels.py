@@ -21,8 +21,8 @@ def make_pixel_tracks(scene: TrackScene, view: int, frame: int, step: int) -> Se
     """
     if not (0 <= view < len(scene.views) and 0 <= frame < scene.frames and step >= 1):
         raise InputError(
-            f"pixels must be of a view in 0..{len(scene.views) - 1} and a frame in 0..{scene.frames - 1}, every 1st or "
-            f"more, not view {view}, frame {frame}, every {step}"
+            f"pixels must be of a view in 0..{len(scene.views) - 1} and a frame in 0..{scene.frames - 1}, with a step "
+            f"of 1 or more, not view {view}, frame {frame}, step {step}"
         )
     points = _points(scene, view, frame, step)
     seen = scene.look(scene.bind(points), np.arange(scene.frames)).visible.any(axis=(0, 1))

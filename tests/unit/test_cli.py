@@ -49,20 +49,39 @@ def test_standard_is_the_default_preset(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
+        (("generat",), "No such command 'generat'. Did you mean 'generate'?"),
+        (("--preset", "tiny"), "'--preset' comes after a command, for example: perpetua generate --preset"),
+        (("--sed", "1"), "No such option '--sed'"),
         (("generate", "--preset", "tinny"), "did you mean 'tiny'?"),
+        (("generate", "--preset", "Tiny"), "must be one of tiny, quick, standard, benchmark, not 'Tiny'; did you mean"),
         (("generate", "--until", "camera"), "did you mean 'cameras'?"),
         (("generate", "--set", "render.samples=-3"), "'render.samples' must be greater than or equal to 1"),
         (("generate", "--set", "render.sample=3"), "did you mean 'render.samples'?"),
         (("generate", "--config", "no-such-file.yaml"), "cannot read config 'no-such-file.yaml'"),
-        (("generate", "--rooms", "0"), "0 is not in the range x>=1"),
-        (("generate", "--seed", "-1"), "-1 is not in the range x>=0"),
+        (("generate", "--set", "actors.body=smpl"), "did you mean 'smplx'?"),
+        (("generate", "--set", "actors.body=smplx"), "needs SMPLX_MALE.npz or SMPLX_NEUTRAL.npz in"),
+        (("generate", "--set", "actors.clothing.source=makehuman"), "must hold MakeHuman garments"),
+        (("generate", "--set", "actors.motion.source=clip"), "did you mean 'clips'?"),
+        (("generate", "--set", "actors.motion.source=clips"), "actors.motion.clips.folder"),
+        (("generate", "--set", "actors.motion.source=kimodo"), "is not a program on this machine"),
+        (("generate", "--set", "actors.motion.actions=evryday"), "actors.motion.actions must be one of"),
+        (("generate", "--config", "."), "cannot read config '.': Is a directory"),
+        (("generate", "--out", "/dev/null/out"), "cannot be a folder, as '/dev/null' is a file"),
+        (("generate", "--rooms", "0"), "must be 1 or more, not 0"),
+        (("generate", "--rooms", "two"), "must be a whole number, not 'two'"),
+        (("generate", "--seed", "-1"), "must be 0 or more, not -1"),
         (("generate", "--device", "gpu"), "'gpu' is not one of"),
+        (("config", "render"), "unexpected extra argument (render)"),
+        (("completion", "tcsh"), "'tcsh' is not one of 'bash', 'zsh', 'fish'"),
         (("status", "--out", "no-such-folder"), "holds no run of perpetua"),
         (("clean", "--out", "no-such-folder"), "holds no run of perpetua"),
-        (("verify", "no-such-folder"), "no-such-folder"),
-        (("preview", "no-such-folder"), "no-such-folder"),
+        (("verify", "no-such-folder"), "'no-such-folder' does not exist"),
+        (("verify", "."), "'.' holds no sequence"),
+        (("preview", "no-such-folder"), "'no-such-folder' does not exist; the folder of a sequence is required"),
+        (("preview", "."), "'.' is not the folder of a sequence: it has no tracks_xyz.npy"),
+        (("tracks", ".", "--out", "more"), "'.' is not the folder of a sequence"),
         (("preview",), "preview needs one of: the folder of a sequence, --actors N, --rooms N"),
-        (("preview", "--actors", "0"), "0 is not in the range x>=1"),
+        (("preview", "--actors", "0"), "must be 1 or more, not 0"),
         (("preview", "--actors", "1", "--out", "sheet.gif"), "a picture must end in .png or .jpg, not 'sheet.gif'"),
     ],
 )
@@ -74,6 +93,73 @@ def test_bad_input_gives_a_clear_error_and_exit_code_2(
     assert done.exit_code == 2, done.output
     assert expected in done.output
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_outer_folder_leads_to_the_sequence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    sequence = Path("data/train/seed7-room0000")
+    sequence.mkdir(parents=True)
+    (sequence / "tracks_xyz.npy").touch()
+    done = _perpetua("preview", "data")
+    assert done.exit_code == 2
+    assert f"did you mean '{sequence}'?" in done.output
+
+
+def test_a_folder_that_takes_no_files_is_said_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.access", lambda place, mode: False)
+    done = _perpetua("generate", "--preset", "tiny", "--out", str(tmp_path / "out"), "--dry-run")
+    assert done.exit_code == 2
+    assert f"you may not write to '{tmp_path}'" in done.output
+
+
+@pytest.mark.parametrize(
+    ("error", "code"), [(FileNotFoundError(2, "No such file", "x.png"), 2), (OSError(28, "No space left", "x.png"), 1)]
+)
+def test_what_the_system_refuses_is_no_traceback(
+    error: OSError, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(folder: Path) -> None:
+        raise error
+
+    monkeypatch.setattr("perpetua.pipeline.status.read_status", refuse)
+    done = _perpetua("status", "--out", str(tmp_path))
+    assert done.exit_code == code
+    assert done.output == f"perpetua: cannot use 'x.png': {error.strerror}\n"
+
+
+def test_help_lists_every_command_whole() -> None:
+    shown = _perpetua("--help").output.partition("Options:")[2]
+    assert "..." not in shown
+    assert all(f"\n  {name} " in shown for name in main.commands)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_scripts_ask_the_program(shell: str) -> None:
+    done = _perpetua("completion", shell)
+    assert done.exit_code == 0
+    assert f"_PERPETUA_COMPLETE={shell}_complete" in done.output
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("perpetua gen", "generate"),
+        ("perpetua generate --pre", "--preset"),
+        ("perpetua generate --preset ti", "tiny"),
+        ("perpetua generate --until cam", "cameras"),
+        ("perpetua generate --set render.sam", "render.samples="),
+    ],
+)
+def test_shells_complete_what_is_typed(words: str, offered: str) -> None:
+    typed = {"_PERPETUA_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+    done = CliRunner().invoke(main, env=typed, prog_name="perpetua")
+    assert offered in [line.partition(",")[2] for line in done.output.splitlines()]
+
+
+def test_config_reads_what_it_writes(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text(_perpetua("config", "--preset", "quick", "--set", "actors.count=3").output)
+    assert "  count: 3  # actors in a room" in _perpetua("config", "--preset", "quick", "--config", str(mine)).output
 
 
 def test_other_settings_do_not_overwrite_an_output_folder(tmp_path: Path) -> None:

@@ -190,10 +190,10 @@ def test_a_hanging_generator_is_stopped(monkeypatch: pytest.MonkeyPatch, tmp_pat
     assert time.monotonic() - begin < 20.0
 
 
-def test_missing_infinigen_names_the_extra(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_missing_infinigen_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "infinigen2", None)
     with pytest.raises(EnvironmentSetupError, match=r"perpetua\[infinigen\]"):
-        InfinigenRooms().make(wish("kitchen"), CONFIG, SEED, 0, tmp_path)
+        InfinigenRooms().draws(CONFIG)
 
 
 def test_redraws_are_counted_by_reason(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -1,50 +1,30 @@
 """Other tracks of a finished sequence, from the work area."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from small_run import write_run
 from synthetic_scene import make_scene
 
-from perpetua.actors.types import Route
 from perpetua.audit.config import AuditConfig
 from perpetua.audit.verify import verify_sequence
 from perpetua.cli import main
-from perpetua.config import load_config
-from perpetua.errors import InputError
+from perpetua.errors import InputError, SequenceFormatError
 from perpetua.geometry.pinhole import project
 from perpetua.geometry.transforms import invert_rigid, transform_points
-from perpetua.pipeline import codec
 from perpetua.pipeline.kept import load_deep_scene
-from perpetua.pipeline.layout import OutputLayout, open_run
 from perpetua.pipeline.retrack import PixelChoice, write_other_tracks
-from perpetua.pipeline.stages import STAGES
-from perpetua.pipeline.store import Manifest, StageFolder
 
 SEED, ROOM = 5, 2
 
 
 @pytest.fixture(scope="module")
 def sequence(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A sequence's folder and its work area; the folder itself is empty, since nothing in it is needed."""
-    out = tmp_path_factory.mktemp("run")
-    config = load_config("tiny", assignments=("tracks.count=60",))
-    open_run(out, SEED, range(ROOM, ROOM + 1), config, False)
-    layout = OutputLayout(out, config.export, SEED, ROOM)
-    layout.sequence_folder.mkdir(parents=True)
-    scene = make_scene()
-    routes = tuple(Route(actor.actor, np.zeros((6, 3)), np.zeros(6)) for actor in scene.actors)
-    values = {
-        "room": scene.room, "routes": routes, "motion": scene.motions, "actors": scene.actors, "cameras": scene.cameras,
-        "render": scene.views,
-    }  # fmt: skip
-    for stage in STAGES:
-        if stage.name in values:
-            folder = StageFolder(layout.work_folder, stage.number, stage.name)
-            codec.save(values[stage.name], folder.begin("key", False))
-            folder.finish(Manifest("key", stage.name, 1, SEED, ROOM, {}, {}, 0.0, 0.0))
-    return layout.sequence_folder
+    """A sequence's folder, in a run whose work area is kept."""
+    return write_run(tmp_path_factory.mktemp("run"), SEED, ROOM)
 
 
 def test_any_number_is_written_as_a_whole_sequence_that_passes(sequence: Path, tmp_path: Path) -> None:
@@ -76,7 +56,9 @@ def test_bad_requests_are_refused_with_a_remedy(sequence: Path, tmp_path: Path) 
     with pytest.raises(InputError, match=r"exists: choose another --out"):
         write_other_tracks(sequence, tmp_path, 5, 0, None)
     with pytest.raises(InputError, match=r"work area of .* is not kept"):
-        write_other_tracks(tmp_path / "elsewhere", tmp_path / "new", 5, 0, None)
+        write_other_tracks(shutil.copytree(sequence, tmp_path / "elsewhere"), tmp_path / "new", 5, 0, None)
+    with pytest.raises(SequenceFormatError, match=r"is not the folder of a sequence"):
+        write_other_tracks(sequence.parent, tmp_path / "new", 5, 0, None)
     with pytest.raises(InputError, match=r"view in 0\.\.2 and a frame in 0\.\.5"):
         write_other_tracks(sequence, tmp_path / "new", 5, 0, PixelChoice(3, 0, 1))
     for text in ("1:2", "a:b:c", "0:1:-2"):

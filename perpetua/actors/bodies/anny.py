@@ -17,6 +17,7 @@ from perpetua.actors.clothing.outfit import Dressed, dress
 from perpetua.actors.clothing.piece import Piece
 from perpetua.actors.clothing.shoes import Footing
 from perpetua.actors.clothing.surface import triangles
+from perpetua.actors.clothing.wardrobe import clothes_folder, load_wardrobe
 from perpetua.actors.clothing.wearer import Wearer
 from perpetua.actors.config import ActorsConfig
 from perpetua.actors.types import ActorPart, BodyMotion, Skeleton
@@ -51,6 +52,15 @@ class AnnyBody:
 @BODY_MODELS.register("anny")
 class AnnyModel:
     """Draws people and dresses them."""
+
+    def check(self, config: ActorsConfig) -> None:
+        """A folder of clothes that the config asks for must hold some.
+
+        Raises:
+            AssetError: it does not.
+        """
+        if config.clothing.source == "makehuman":
+            load_wardrobe(clothes_folder(config.clothing.folder))
 
     def draw(self, actor: int, config: ActorsConfig, seed: StageSeed) -> Body:
         """The body of one actor of a room."""

@@ -79,6 +79,16 @@ class _Clothes:
 class SmplxBodies:
     """Draws SMPL-X shapes and dresses them."""
 
+    def check(self, config: ActorsConfig) -> None:
+        """Model files for men and women must be there, and the folder of textures if the config names one.
+
+        Raises:
+            AssetError: they are not.
+        """
+        for female in (False, True):
+            model_file(config.smplx, female)
+        find_textures(config.smplx.textures)
+
     def draw(self, actor: int, config: ActorsConfig, seed: StageSeed) -> Body:
         """The body of one actor of a room."""
         person, rng = draw_person(actor, config, seed), seed.stream("smplx", actor)

@@ -39,6 +39,14 @@ class Body(Protocol):
 class BodyModel(Protocol):
     """Draws bodies; the same arguments give the same body, bit for bit."""
 
+    def check(self, config: ActorsConfig) -> None:
+        """Passes a config that bodies can be drawn with; nothing is made.
+
+        Raises:
+            AssetError: files that it needs are missing.
+        """
+        ...
+
     def draw(self, actor: int, config: ActorsConfig, seed: StageSeed) -> Body:
         """The body of one actor of a room; actors of one room differ in looks."""
         ...

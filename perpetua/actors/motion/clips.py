@@ -44,6 +44,14 @@ class ClipMotion:
     standing part, if it has one, is played while the route pauses.
     """
 
+    def check(self, config: MotionConfig) -> None:
+        """The folder must hold clips.
+
+        Raises:
+            AssetError: there is no folder, no clip in it, or its index is not valid.
+        """
+        clip_files(clip_folder(config.clips))
+
     def make(
         self, route: Route, skeleton: Skeleton, room: Room, fps: float, config: MotionConfig, seed: StageSeed
     ) -> BodyMotion:

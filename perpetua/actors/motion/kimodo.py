@@ -7,7 +7,7 @@ from perpetua.actors.motion.path import RoutePath
 from perpetua.actors.motion.recorded.body import body_along
 from perpetua.actors.motion.recorded.clip import Clip
 from perpetua.actors.motion.recorded.kimodo_files import KIMODO_FPS, LEAD_S, Wish, make_wish
-from perpetua.actors.motion.recorded.kimodo_program import generate
+from perpetua.actors.motion.recorded.kimodo_program import generate, kimodo_program
 from perpetua.actors.motion.recorded.ride import going_facing, make_clock, real_time
 from perpetua.actors.motion.recorded.tape import make_tape
 from perpetua.actors.motion.source import MOTION_SOURCES
@@ -26,6 +26,14 @@ class KimodoMotion:
     Kimodo (https://github.com/nv-tlabs/kimodo, Apache-2.0; its models have licences of their own) is installed and
     run by the user; about 17 GB of GPU memory are needed. Results are kept under ``cache/kimodo`` in the asset folder.
     """
+
+    def check(self, config: MotionConfig) -> None:
+        """The program must be there, and its model one whose motion can be read.
+
+        Raises:
+            AssetError: it is not.
+        """
+        kimodo_program(config.kimodo)
 
     def make(
         self, route: Route, skeleton: Skeleton, room: Room, fps: float, config: MotionConfig, seed: StageSeed

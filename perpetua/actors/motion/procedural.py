@@ -86,6 +86,9 @@ class _Stride:
 class ProceduralMotion:
     """Walks, jogs, turns, stands and sits along any route, with arms, trunk and head moved by words."""
 
+    def check(self, config: MotionConfig) -> None:
+        """Nothing is needed."""
+
     def make(
         self, route: Route, skeleton: Skeleton, room: Room, fps: float, config: MotionConfig, seed: StageSeed
     ) -> BodyMotion:

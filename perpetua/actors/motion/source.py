@@ -12,6 +12,14 @@ from perpetua.seeding import StageSeed
 class MotionSource(Protocol):
     """Makes full-body motion along a route; the same arguments give the same motion, bit for bit."""
 
+    def check(self, config: MotionConfig) -> None:
+        """Passes a config that motion can be made with; nothing is made.
+
+        Raises:
+            AssetError: files or a program that it needs are missing.
+        """
+        ...
+
     def make(
         self, route: Route, skeleton: Skeleton, room: Room, fps: float, config: MotionConfig, seed: StageSeed
     ) -> BodyMotion:

@@ -34,9 +34,7 @@ def generate(wish: Wish, config: KimodoConfig, seed: int) -> Clip:
     Raises:
         AssetError: the program is missing, fails, takes too long, or what it wrote cannot be used.
     """
-    if "g1" in config.model.lower():
-        raise AssetError(f"actors.motion.kimodo.model '{config.model}' makes motion of a robot; {SUPPORTED}")
-    program = _program(config)
+    program = kimodo_program(config)
     kept = asset_folder() / "cache" / "kimodo" / _key(wish, config, seed, program)
     if kept.is_dir():
         with contextlib.suppress(AssetError):
@@ -48,7 +46,14 @@ def generate(wish: Wish, config: KimodoConfig, seed: int) -> Clip:
     return clip
 
 
-def _program(config: KimodoConfig) -> list[str]:
+def kimodo_program(config: KimodoConfig) -> list[str]:
+    """The program's path and the arguments that the config gives it.
+
+    Raises:
+        AssetError: it is not on this machine, or its model moves no people.
+    """
+    if "g1" in config.model.lower():
+        raise AssetError(f"actors.motion.kimodo.model '{config.model}' makes motion of a robot; {SUPPORTED}")
     words = shlex.split(config.program)
     found = shutil.which(words[0]) if words else None
     if found is None:

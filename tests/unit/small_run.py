@@ -1,0 +1,42 @@
+"""The synthetic scene as a finished run: output folder, sequence, work area; no Blender."""
+
+from pathlib import Path
+
+import numpy as np
+from synthetic_scene import make_scene
+from synthetic_sequence import make_scene_tracks
+
+from perpetua.actors.types import Route
+from perpetua.config import load_config
+from perpetua.formats.tapvid_mv import write_sequence
+from perpetua.pipeline import codec
+from perpetua.pipeline.layout import OutputLayout, open_run
+from perpetua.pipeline.record import sequence_record
+from perpetua.pipeline.stages import STAGES
+from perpetua.pipeline.store import Manifest, StageFolder
+from perpetua.seeding import StageSeed
+
+TRACKS = 60
+
+
+def write_run(out: Path, seed: int, room: int = 0) -> Path:
+    """Writes a run of one room into ``out``; returns the sequence's folder."""
+    config = load_config("tiny", assignments=(f"tracks.count={TRACKS}",))
+    open_run(out, seed, range(room, room + 1), config, False)
+    layout = OutputLayout(out, config.export, seed, room)
+    layout.sequence_folder.mkdir(parents=True)
+    scene = make_scene()
+    routes = tuple(Route(actor.actor, np.zeros((6, 3)), np.zeros(6)) for actor in scene.actors)
+    values = {
+        "room": scene.room, "routes": routes, "motion": scene.motions, "actors": scene.actors,
+        "cameras": scene.cameras, "render": scene.views,
+    }  # fmt: skip
+    for stage in STAGES:
+        if stage.name in values:
+            folder = StageFolder(layout.work_folder, stage.number, stage.name)
+            codec.save(values[stage.name], folder.begin("key", False))
+            folder.finish(Manifest("key", stage.name, 1, seed, room, {}, {}, 0.0, 0.0))
+    record = sequence_record(config, StageSeed(seed, room, "tracks"), scene.room, routes, scene.actors)
+    tracks = make_scene_tracks(scene, config.tracks, seed)
+    write_sequence(layout.sequence_folder, scene, tracks, record)
+    return layout.sequence_folder
