@@ -14,7 +14,7 @@ What goes wrong raises the errors of ``perpetua.errors``, with the message that 
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from perpetua.errors import GenerationError, InputError
 from perpetua.formats.reader import Sequence, read_sequence
@@ -28,7 +28,7 @@ def generate(
     preset: str = "standard",
     config: str | Path | None = None,
     settings: Mapping[str, Any] | None = None,
-    workers: int = 1,
+    workers: int | Literal["auto"] = 1,
     device: str = "auto",
     replace: bool = False,
     quiet: bool = False,
@@ -42,8 +42,8 @@ def generate(
         preset: settings to start from: tiny, quick, standard or benchmark.
         config: a YAML file with settings.
         settings: changes by key, such as ``{"rooms.source": "procedural", "actors.count": 3}``.
-        workers: rooms made at a time. Above 1 they are made in processes of their own, which import the calling
-            script: it must then call this under ``if __name__ == "__main__":``.
+        workers: rooms made at a time; auto for as many as the machine bears. With several they are made in processes
+            of their own, which import the calling script: call this under ``if __name__ == "__main__":`` there.
         device: what Cycles renders on; auto takes a GPU if there is one.
         replace: allow other settings than the ones that ``out`` was made with.
         quiet: say nothing while rooms are made; ``out/log.jsonl`` tells all.
@@ -70,7 +70,7 @@ def generate(
         rooms=wanted,
         until=None,
         out=Path(out),
-        workers=workers,
+        workers=0 if workers == "auto" else workers,
         device=device,
         replace=replace,
     )
@@ -101,10 +101,10 @@ def sequences(folder: str | Path) -> list[Path]:
     return find_sequences(Path(folder))
 
 
-def _check_numbers(seed: int, rooms: range, workers: int) -> None:
+def _check_numbers(seed: int, rooms: range, workers: int | str) -> None:
     if seed < 0:
         raise InputError(f"seed must be 0 or more, not {seed}")
     if len(rooms) == 0 or rooms.start < 0 or rooms.step != 1:
         raise InputError(f"rooms must be 1 or more, or a range of rooms such as range(10, 20), not {rooms}")
-    if workers < 1:
-        raise InputError(f"workers must be 1 or more, not {workers}")
+    if workers != "auto" and (isinstance(workers, str) or workers < 1):
+        raise InputError(f"workers must be 1 or more, or auto, not {workers}")
