@@ -7,7 +7,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
-PROGRAM = ".venv/bin/perpetua"
+PROGRAMS = (".venv/bin/perpetua", "perpetua")
+# Stands in examples for what the reader had before, and for a folder of a cluster.
+_ELISION, _SHARED = "...", "/shared/"
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -20,8 +22,8 @@ class DocCommand:
 
     @property
     def arguments(self) -> list[str]:
-        """What follows the program's name."""
-        return list(self.words[1:])
+        """What follows the program's name; a shared folder as one beside."""
+        return [word.removeprefix(_SHARED) for word in self.words[1:] if word != _ELISION]
 
     def __str__(self) -> str:
         return shlex.join(self.words)
