@@ -58,7 +58,7 @@ def save_recording(source: ExportSource, target: Path) -> None:
     """
     rr = _sdk()
     stream = rr.RecordingStream("perpetua", recording_id=source.name)
-    stream.save(str(target), default_blueprint=viewer_layout(source))
+    stream.save(str(target))
     _record(rr, stream, source)
 
 
@@ -71,7 +71,7 @@ def open_viewer(source: ExportSource) -> None:
     rr = _sdk()
     stream = rr.RecordingStream("perpetua", recording_id=source.name)
     try:
-        stream.spawn(default_blueprint=viewer_layout(source))
+        stream.spawn()
     except (RuntimeError, OSError) as error:
         raise EnvironmentSetupError(
             f"Rerun's viewer does not start ({error}): give --out FILE.rrd, and open that file elsewhere"
@@ -89,6 +89,8 @@ def _sdk() -> Any:
 
 
 def _record(rr: Any, stream: Any, source: ExportSource) -> None:
+    # Made the active one: the viewer would go on with the layout of another sequence, of other views.
+    stream.send_blueprint(viewer_layout(source), make_active=True, make_default=True)
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     pixels_px = tuple(source.track_pixel_px(view) for view in range(len(source.sequence.views)))
     recording = _Recording(rr, stream, source, pixels_px, _track_colours(source), _tracks_by_object(source))

@@ -111,7 +111,7 @@ def _counted_charts(counts: scales.Counts) -> list[Chart]:
         tally("Occlusions", "how often a track is hidden while on the image; tracks by views that see them",
               counts.occlusions, "times"),
         histogram("Depth", "m, pixels with a surface", counts.depth, scales.DEPTH_M, "m"),
-        histogram("Field of view", "degrees across the image, each view",
+        histogram("Focal lengths", "as fields of view: degrees across the image; views",
                   counts.field_of_view, scales.FIELD_OF_VIEW_DEG, "degrees"),
         histogram("Angle between views", "degrees between the optical axes of two views at the same frame",
                   counts.apart, scales.APART_DEG, "degrees"),

@@ -48,6 +48,7 @@ def column(recording: Any, path: str, component: str, static: bool = False) -> l
 
 
 def test_timelines_count_frames_and_seconds(recording: Any, made: tuple[Path, Scene]) -> None:
+    assert {column.name for column in recording.schema().index_columns()} >= {"frame", "time"}
     table = recording.view(index="frame", contents="/world/view_0").select().read_all()
     assert table["frame"].to_pylist() == list(range(FRAMES))
     # The synthetic sequence records no rate, so 24 frames per second hold.
