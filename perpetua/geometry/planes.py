@@ -21,25 +21,24 @@ class Planes:
     def of(cls, corner_m: Float64[np.ndarray, "N 3 3"]) -> "Planes":
         """The planes of triangles; normals point to where corners go round counter-clockwise."""
         normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+        normal /= np.maximum(np.sqrt(np.einsum("nc,nc->n", normal, normal)), 1e-30)[:, None]
         return cls(normal, np.einsum("nc,nc->n", normal, corner_m[:, 0]))
 
     def take(self, chosen: Integer[np.ndarray, " M"] | Bool[np.ndarray, " N"]) -> "Planes":
         """Some of the planes."""
         return Planes(self.normal[chosen], self.offset_m[chosen])
 
-    def height_m(self, place_m: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, " N"]:
+    def height_m(self, place_m: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
         """How far a place lies before each plane, on the side that the normal points to."""
-        # A matrix product would go to a pool of threads, which wait for one another on a busy machine.
-        return np.asarray(np.einsum("nc,c->n", self.normal, place_m) - self.offset_m)
+        return np.asarray(np.einsum("nc,nc->n", self.normal, place_m) - self.offset_m)
 
     def along_m(
         self,
-        eye_m: Float64[np.ndarray, "3"],
+        eye_m: Float64[np.ndarray, "N 3"],
         unit: Float64[np.ndarray, "N 3"],
         rough_m: Float32[np.ndarray, " N"],
     ) -> Float64[np.ndarray, " N"]:
-        """Length of rays from one place to their planes; ``rough_m`` for those that almost lie in them."""
+        """Length of rays to their planes; ``rough_m`` for those that almost lie in them."""
         slope = np.einsum("nc,nc->n", self.normal, unit)
         grazing = np.abs(slope) < LEAST_SLOPE
         exact_m = -self.height_m(eye_m) / np.where(grazing, 1.0, slope)

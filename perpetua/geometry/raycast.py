@@ -70,11 +70,11 @@ class Caster:
         distance_m[hit] = _plane_distance_m(origins_m[hit], unit[hit], corners_m, found["tfar"][hit].astype(np.float64))
         return RayHits(distance_m, face, barycentric)
 
-    def meet(self, eye_m: Float64[np.ndarray, "3"], unit: Float32[np.ndarray, "N 3"]) -> RoughHits:
-        """The first triangle, front or back side, on each ray from a place in a direction of unit length."""
+    def meet(self, origins: Float32[np.ndarray, "N 3"], unit: Float32[np.ndarray, "N 3"]) -> RoughHits:
+        """The first triangle, front or back side, on each ray in a direction of unit length."""
         if len(unit) == 0 or len(self.mesh.faces) == 0:
             return RoughHits(np.full(len(unit), np.inf, np.float32), np.full(len(unit), NO_FACE, np.int32))
-        found = self._embree.run(np.repeat(_single(eye_m)[None], len(unit), axis=0), _single(unit), output=1)
+        found = self._embree.run(_single(origins), _single(unit), output=1)
         face = np.maximum(found["primID"], NO_FACE).astype(np.int32)
         return RoughHits(np.where(face == NO_FACE, np.float32(np.inf), found["tfar"]), face)
 
@@ -128,7 +128,7 @@ class Caster:
 
 
 class MovingCaster:
-    """First hits, from one place, on one mesh whose vertices move; ``move_to`` comes before every change of place."""
+    """First hits on one mesh whose vertices move; ``move_to`` comes before every change of place."""
 
     def __init__(self, vertices_m: Float32[np.ndarray, "P 3"], faces: Int32[np.ndarray, "F 3"]) -> None:
         self.vertices_m, self.faces = vertices_m, faces
@@ -147,11 +147,11 @@ class MovingCaster:
 
     def meet(
         self,
-        eye_m: Float64[np.ndarray, "3"],
+        origins: Float32[np.ndarray, "N 3"],
         unit: Float32[np.ndarray, "N 3"],
         nearer_than_m: Float32[np.ndarray, " N"] | None = None,
     ) -> RoughHits:
-        """The first triangle, front or back side, on each ray from a place in a direction of unit length.
+        """The first triangle, front or back side, on each ray in a direction of unit length.
 
         What is not nearer than ``nearer_than_m`` on a ray is not met.
         """
@@ -159,9 +159,10 @@ class MovingCaster:
         limit_m = np.full(len(unit), FAR_M, np.float32) if nearer_than_m is None else np.minimum(nearer_than_m, FAR_M)
         if len(unit) and self._warp_mesh is not None:
             warp, kernel = _first_hit_kernel()
-            kinds = ((_single(unit), warp.vec3), (_single(limit_m), float), (face, int), (distance_m, float))
+            rays = ((_single(given), warp.vec3) for given in (origins, unit))
+            kinds = (*rays, (_single(limit_m), float), (face, int), (distance_m, float))
             shared = [warp.array(values, dtype=kind, device="cpu", copy=False) for values, kind in kinds]
-            warp.launch(kernel, len(unit), [self._warp_mesh.id, warp.vec3(*eye_m.tolist()), *shared], device="cpu")
+            warp.launch(kernel, len(unit), [self._warp_mesh.id, *shared], device="cpu")
         return RoughHits(distance_m, face)
 
 
@@ -226,14 +227,14 @@ def _first_hit_kernel() -> tuple[Any, Any]:
     @no_type_check
     def first_hit(
         mesh: warp.uint64,
-        eye: warp.vec3,
+        origins: warp.array(dtype=warp.vec3),
         directions: warp.array(dtype=warp.vec3),
         limit_m: warp.array(dtype=float),
         face: warp.array(dtype=int),
         distance_m: warp.array(dtype=float),
     ):
         i = warp.tid()
-        query = warp.mesh_query_ray(mesh, eye, directions[i], limit_m[i])
+        query = warp.mesh_query_ray(mesh, origins[i], directions[i], limit_m[i])
         if query.result:
             face[i] = query.face
             distance_m[i] = query.t

@@ -7,9 +7,10 @@ from jaxtyping import Float64, Int64
 
 from perpetua.actors.types import ActorMesh
 from perpetua.cameras.types import CameraPath
-from perpetua.geometry.mesh import TriMesh, face_areas_m2, join
+from perpetua.geometry.mesh import face_areas_m2, join
 from perpetua.geometry.pinhole import unproject
-from perpetua.geometry.raycast import Caster
+from perpetua.geometry.planes import Planes
+from perpetua.geometry.raycast import NO_FACE, Caster, MovingCaster
 from perpetua.geometry.transforms import transform_points
 from perpetua.rendering.types import RenderedView
 from perpetua.tracks.sides import connected_surfaces
@@ -130,13 +131,15 @@ def _seen_areas_m2(actor: ActorMesh) -> Float64[np.ndarray, " F"]:
     surface = connected_surfaces(actor.vertices_m[0], actor.faces)
     frames = len(actor.vertices_m)
     covered = np.ones(len(surface), bool)
+    caster = MovingCaster(np.asarray(actor.vertices_m[0]), actor.faces)
+    limit_m = np.full(len(surface), COVER_M, np.float32)
     for frame in sorted({frames // 2, frames - 1}):
-        mesh = TriMesh(actor.vertices_m[frame].astype(np.float64), actor.faces)
-        corner_m = mesh.vertices_m[mesh.faces]
-        normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-        hits = Caster(mesh).first_hit(corner_m.mean(axis=1) + COVER_GAP_M * normal, normal)
-        covered &= (hits.distance_m < COVER_M) & (surface[hits.face] != surface)
+        caster.move_to(np.asarray(actor.vertices_m[frame]))
+        corner_m = caster.corner_m(np.arange(len(surface), dtype=np.int32))
+        normal = Planes.of(corner_m).normal
+        origins = (corner_m.mean(axis=1) + COVER_GAP_M * normal).astype(np.float32)
+        face = caster.meet(origins, normal.astype(np.float32), limit_m).face
+        covered &= (face != NO_FACE) & (surface[face] != surface)
     return np.where(covered, 0.0, face_areas_m2(actor.vertices_m[frames // 2], actor.faces))
 
 

@@ -24,7 +24,7 @@ class ClosedSides:
         """Some of them."""
         return ClosedSides(self.closed[chosen], self.box_m[chosen])
 
-    def hide_back(self, eye_m: Float64[np.ndarray, "3"]) -> Bool[np.ndarray, " N"]:
+    def hide_back(self, eye_m: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Whether the back is hidden from a camera: it is unless that is inside, as a closed room is seen."""
         inside = ((eye_m >= self.box_m[:, 0]) & (eye_m <= self.box_m[:, 1])).all(axis=1)
         return np.asarray(self.closed & ~inside)

@@ -36,26 +36,31 @@ class SceneSight:
         self._frame = 0
 
     def first_hit(
-        self, frame: int, eye_m: Float64[np.ndarray, "3"], directions: Float64[np.ndarray, "N 3"]
+        self,
+        frame: int,
+        eye_m: Float64[np.ndarray, "3"] | Float64[np.ndarray, "N 3"],
+        directions: Float64[np.ndarray, "N 3"],
     ) -> SightHits:
-        """What each ray from one place meets first at a frame; directions need not have unit length.
+        """What each ray, from one place or each from its own, meets first at a frame; directions need not have unit
+        length.
 
         Which triangle is met is found in single precision; how far it is, in double.
         """
         self._go_to(frame)
+        eye_m = np.broadcast_to(eye_m, directions.shape)
         unit = directions / np.sqrt(np.einsum("nc,nc->n", directions, directions))[:, None]
-        single = unit.astype(np.float32)
-        room = self._room.meet(eye_m, single)
-        actors = self._actors.meet(eye_m, single, room.distance_m)
+        origins, single = eye_m.astype(np.float32), unit.astype(np.float32)
+        room = self._room.meet(origins, single)
+        actors = self._actors.meet(origins, single, room.distance_m)
         before = actors.face != NO_FACE
         object_index = np.where(before, self._actor_face.owner[actors.face], self._room_face.owner[room.face])
         face = np.where(before, self._actor_face.face[actors.face], self._room_face.face[room.face])
         distance_m = np.full(len(unit), np.inf)
         on_actor, on_room = np.flatnonzero(before), np.flatnonzero(~before & (room.face != NO_FACE))
         planes = self._room_planes.take(room.face[on_room])
-        distance_m[on_room] = planes.along_m(eye_m, unit[on_room], room.distance_m[on_room])
+        distance_m[on_room] = planes.along_m(eye_m[on_room], unit[on_room], room.distance_m[on_room])
         planes = Planes.of(self._actors.corner_m(actors.face[on_actor]))
-        distance_m[on_actor] = planes.along_m(eye_m, unit[on_actor], actors.distance_m[on_actor])
+        distance_m[on_actor] = planes.along_m(eye_m[on_actor], unit[on_actor], actors.distance_m[on_actor])
         return SightHits(object_index, face, distance_m)
 
     def _go_to(self, frame: int) -> None:

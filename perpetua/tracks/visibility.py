@@ -13,16 +13,18 @@ Two witnesses are asked.
 A point is visible where both say so. Where they differ it is hidden, and counted by the reason (``SightReport``).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int64, UInt16
+from jaxtyping import Bool, Float64, Int64
 
 from perpetua.cameras.types import CameraPath
-from perpetua.geometry.pinhole import Intrinsics, inside_image, project
+from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.planes import Planes
-from perpetua.geometry.transforms import invert_rigid, transform_points
+from perpetua.geometry.transforms import invert_rigid
 from perpetua.rendering.types import RenderedView
+from perpetua.tracks.around import Around, ViewFrame
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.placed import PlacedPoints, Placement, as_exported
 from perpetua.tracks.sides import ClosedSides
@@ -40,23 +42,6 @@ COINCIDENT_M = 0.01
 # Triangles within so many pixels of a point, measured along its surface, are its neighbours.
 NEIGHBOUR_PX = 2.0
 GRAZING_COSINE = float(np.cos(np.radians(80.0)))
-CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-
-
-@dataclass(frozen=True)
-class ViewFrame:
-    """What one camera saw at one frame; ``camera_from_world`` and ``intrinsics`` as they are exported."""
-
-    frame: int
-    camera_from_world: Float64[np.ndarray, "4 4"]
-    intrinsics: Intrinsics
-    depth_m: Float32[np.ndarray, "H W"]
-    object_index: UInt16[np.ndarray, "H W"]
-
-    @property
-    def centre_m(self) -> Float64[np.ndarray, "3"]:
-        """Where the camera is in the world."""
-        return np.asarray(-self.camera_from_world[:3, :3].T @ self.camera_from_world[:3, 3])
 
 
 @dataclass(frozen=True)
@@ -91,83 +76,58 @@ def visible_in_views(
     report = SightReport()
     placement = Placement(bound, sides)
     for place, frame in enumerate(frames.tolist()):
-        placed = placement.at(frame)
-        for index, view in enumerate(views):
-            seen = ViewFrame(
+        seen = [
+            ViewFrame(
                 frame,
                 camera_from_world[index][frame],
                 intrinsics[index],
                 np.asarray(view.depth_m[frame]),
                 np.asarray(view.object_index[frame]),
             )
-            visible[index, place], counted = visible_in_frame(placed, seen, sight, hair, config)
-            report = report + counted
+            for index, view in enumerate(views)
+        ]
+        visible[:, place], counted = visible_in_frame(placement.at(frame), seen, sight, hair, config)
+        report = report + counted
     return Sightings(visible, report)
 
 
 def visible_in_frame(
-    placed: PlacedPoints, seen: ViewFrame, sight: SceneSight, hair: HairFaces, config: TracksConfig
-) -> tuple[Bool[np.ndarray, " N"], SightReport]:
-    """Whether points are seen in one image, and how the two witnesses agreed."""
-    pixel_px = project(seen.intrinsics, transform_points(seen.camera_from_world, placed.point_m))
-    inside = np.flatnonzero(inside_image(seen.intrinsics, pixel_px))
-    points = placed.take(inside)
-    around = _Around.of(pixel_px[inside], seen)
+    placed: PlacedPoints, views: Sequence[ViewFrame], sight: SceneSight, hair: HairFaces, config: TracksConfig
+) -> tuple[Bool[np.ndarray, "C N"], SightReport]:
+    """Whether points are seen in each image of one frame, and how the two witnesses agreed."""
+    around = Around.of(placed.point_m, views)
+    points = placed.take(around.point)
     shows = around.valid & (around.shown == points.object_index[:, None])
-    eye_m = seen.centre_m
-    offset_m = points.point_m - eye_m
-    hits = sight.first_hit(seen.frame, eye_m, offset_m)
+    offset_m = points.point_m - around.eye_m
+    hits = sight.first_hit(views[0].frame, around.eye_m, offset_m)
     length_m = np.sqrt(np.einsum("nc,nc->n", offset_m, offset_m))
-    height_m = points.planes.height_m(eye_m)
+    height_m = points.planes.height_m(around.eye_m)
     cosine = np.abs(height_m) / np.maximum(length_m, 1e-30)
     own = (hits.object_index == points.object_index) & (hits.face == points.face)
     reached = own | (hits.distance_m >= length_m * (1.0 - REACHED_SHARE) - REACHED_M)
-    turned = (height_m <= 0.0) & points.sides.hide_back(eye_m)
+    turned = (height_m <= 0.0) & points.sides.hide_back(around.eye_m)
     reached &= ~turned
-    agrees = (shows & _on_plane(points.planes, height_m, around, seen, config)).any(axis=1)
+    agrees = (shows & _on_plane(points.planes, height_m, around, config)).any(axis=1)
     unsure = np.flatnonzero(reached & ~agrees & shows.any(axis=1))
-    reach_m = NEIGHBOUR_PX * length_m / seen.intrinsics.fx_px / np.maximum(cosine, GRAZING_COSINE)
-    as_meshed = np.zeros(len(inside), bool)
-    agrees[unsure], as_meshed[unsure] = _on_neighbours(points.point_m, reach_m, unsure, shows, around, seen, sight)
-    visible = np.zeros(len(placed.point_m), bool)
-    visible[inside] = reached & agrees
+    reach_m = NEIGHBOUR_PX * length_m * around.pixel_rad / np.maximum(cosine, GRAZING_COSINE)
+    as_meshed = np.zeros(len(reached), bool)
+    agrees[unsure], as_meshed[unsure] = _on_neighbours(
+        points.point_m, reach_m, unsure, shows, around, sight, views[0].frame
+    )
+    visible = np.zeros((len(views), len(placed.point_m)), bool)
+    visible[around.view, around.point] = reached & agrees
     strands = hair.has(points.object_index, points.face) | (~reached & hair.has(hits.object_index, hits.face))
-    counted = _count(len(visible), reached, agrees, turned, strands, cosine, length_m, hits, shows, as_meshed, around)
-    return visible, counted
-
-
-@dataclass(frozen=True)
-class _Around:
-    """The four pixel centres around each projection, and what they show; not ``valid`` off the image."""
-
-    column: Int64[np.ndarray, "N 4"]
-    row: Int64[np.ndarray, "N 4"]
-    valid: Bool[np.ndarray, "N 4"]
-    shown: UInt16[np.ndarray, "N 4"]
-    depth_m: Float64[np.ndarray, "N 4"]
-
-    @classmethod
-    def of(cls, pixel_px: Float64[np.ndarray, "N 2"], seen: ViewFrame) -> "_Around":
-        height, width = seen.depth_m.shape
-        corner = np.floor(pixel_px).astype(np.int64)[:, None] + CORNERS
-        column, row = corner[..., 0], corner[..., 1]
-        valid = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        column, row = np.clip(column, 0, width - 1), np.clip(row, 0, height - 1)
-        return cls(column, row, valid, seen.object_index[row, column], seen.depth_m[row, column].astype(np.float64))
-
-    def rays(self, camera: Intrinsics) -> Float64[np.ndarray, "N 4 3"]:
-        """Directions of the pixel centres in the camera, with Z = 1."""
-        x, y = (self.column - camera.cx_px) / camera.fx_px, (self.row - camera.cy_px) / camera.fy_px
-        return np.stack([x, y, np.ones(x.shape)], axis=2)
+    return visible, _count(
+        visible.size, reached, agrees, turned, strands, cosine, length_m, hits, shows, as_meshed, around
+    )
 
 
 def _on_plane(
-    planes: Planes, height_m: Float64[np.ndarray, " N"], around: _Around, seen: ViewFrame, config: TracksConfig
-) -> Bool[np.ndarray, "N 4"]:
+    planes: Planes, height_m: Float64[np.ndarray, " M"], around: Around, config: TracksConfig
+) -> Bool[np.ndarray, "M 4"]:
     """Whether rendered depth is that of each point's own plane along the rays of the pixel centres."""
-    normal = np.einsum("ij,nj->ni", seen.camera_from_world[:3, :3], planes.normal)
     with np.errstate(divide="ignore", invalid="ignore"):
-        plane_m = -height_m[:, None] / np.einsum("nc,nkc->nk", normal, around.rays(seen.intrinsics))
+        plane_m = -height_m[:, None] / np.einsum("nc,nkc->nk", planes.normal, around.direction)
         in_front_m = plane_m - around.depth_m
         return np.asarray(
             np.isfinite(plane_m)
@@ -178,28 +138,28 @@ def _on_plane(
 
 
 def _on_neighbours(
-    point_m: Float64[np.ndarray, "N 3"],
-    reach_m: Float64[np.ndarray, " N"],
-    chosen: Int64[np.ndarray, " M"],
-    shows: Bool[np.ndarray, "N 4"],
-    around: _Around,
-    seen: ViewFrame,
+    point_m: Float64[np.ndarray, "M 3"],
+    reach_m: Float64[np.ndarray, " M"],
+    chosen: Int64[np.ndarray, " U"],
+    shows: Bool[np.ndarray, "M 4"],
+    around: Around,
     sight: SceneSight,
-) -> tuple[Bool[np.ndarray, " M"], Bool[np.ndarray, " M"]]:
+    frame: int,
+) -> tuple[Bool[np.ndarray, " U"], Bool[np.ndarray, " U"]]:
     """Whether a pixel around that shows the point's object was rendered just where its ray meets triangles near by;
     and whether all that show it were rendered just where their rays meet it, near by or not."""
     member, corner = np.nonzero(shows[chosen])
-    ray = around.rays(seen.intrinsics)[chosen[member], corner]
-    direction = ray @ seen.camera_from_world[:3, :3]
-    hits = sight.first_hit(seen.frame, seen.centre_m, direction)
-    meshed_m = hits.distance_m / np.linalg.norm(ray, axis=1)
-    rendered_m = around.depth_m[chosen[member], corner]
+    pair = chosen[member]
+    direction, eye_m = around.direction[pair, corner], around.eye_m[pair]
+    hits = sight.first_hit(frame, eye_m, direction)
+    meshed_m = hits.distance_m / np.linalg.norm(direction, axis=1)
+    rendered_m = around.depth_m[pair, corner]
     same = np.abs(meshed_m - rendered_m) <= SAME_DEPTH_M + SAME_DEPTH_SHARE * rendered_m
-    same &= hits.object_index == around.shown[chosen[member], corner]
+    same &= hits.object_index == around.shown[pair, corner]
     as_meshed = np.ones(len(chosen), bool)
     np.logical_and.at(as_meshed, member, same)
-    hit_m = seen.centre_m + direction * np.where(np.isfinite(meshed_m), meshed_m, 0.0)[:, None]
-    same &= np.linalg.norm(hit_m - point_m[chosen[member]], axis=1) <= reach_m[chosen[member]]
+    hit_m = eye_m + direction * np.where(np.isfinite(meshed_m), meshed_m, 0.0)[:, None]
+    same &= np.linalg.norm(hit_m - point_m[pair], axis=1) <= reach_m[pair]
     confirmed = np.zeros(len(chosen), bool)
     np.logical_or.at(confirmed, member, same)
     return confirmed, as_meshed
@@ -216,7 +176,7 @@ def _count(
     hits: SightHits,
     shows: Bool[np.ndarray, "N 4"],
     as_meshed: Bool[np.ndarray, " N"],
-    around: _Around,
+    around: Around,
 ) -> SightReport:
     """Counts entries by what the witnesses said and, where they differ, by the first reason that applies."""
     blocked, unseen = agrees & ~reached, reached & ~agrees

@@ -114,22 +114,23 @@ def test_a_moving_mesh_is_met_where_it_is_now_as_embree_meets_it(scene: TriMesh)
             direction = rng.normal(size=(300, 3))
             direction /= np.linalg.norm(direction, axis=1, keepdims=True)
             single = direction.astype(np.float32)
-            found, rough = moving.meet(eye_m, single), moved.meet(eye_m, single)
+            origins = np.repeat(eye_m[None].astype(np.float32), 300, axis=0)
+            found, rough = moving.meet(origins, single), moved.meet(origins, single)
             wanted = moved.first_hit(np.repeat(eye_m[None], 300, axis=0), direction)
             assert wanted.hit.sum() > 0
             for one in (found, rough):
                 np.testing.assert_array_equal(one.face, wanted.face)
                 np.testing.assert_allclose(one.distance_m, wanted.distance_m, rtol=1e-5)
-            near = moving.meet(eye_m, single, np.full(300, 1.0, np.float32))
+            near = moving.meet(origins, single, np.full(300, 1.0, np.float32))
             np.testing.assert_array_equal(near.face, np.where(found.distance_m < 1.0, found.face, NO_FACE))
             hit = wanted.hit
             planes = Planes.of(moving.corner_m(found.face[hit]))
-            exact_m = planes.along_m(eye_m, direction[hit], found.distance_m[hit])
+            exact_m = planes.along_m(np.repeat(eye_m[None], hit.sum(), axis=0), direction[hit], found.distance_m[hit])
             np.testing.assert_allclose(exact_m, wanted.distance_m[hit], rtol=1e-12)
 
 
 def test_rays_that_meet_nothing_and_meshes_without_faces() -> None:
-    ball, eye_m = _mesh(trimesh.creation.icosphere(2, 1.0)), np.array([0.0, 3, 5])
+    ball, origins = _mesh(trimesh.creation.icosphere(2, 1.0)), np.array([[0.0, 3, 5]] * 2, np.float32)
     unit = np.array([[0.0, 0, 1], [0.0, 0, -1]], np.float32)
     empty = np.zeros((0, 3), np.int32)
     for caster in (
@@ -138,16 +139,17 @@ def test_rays_that_meet_nothing_and_meshes_without_faces() -> None:
         Caster(ball),
         Caster(join([])),
     ):
-        away = caster.meet(eye_m, unit)
+        away = caster.meet(origins, unit)
         assert (away.face == NO_FACE).all() and np.isinf(away.distance_m).all()
-        assert len(caster.meet(eye_m, unit[:0]).face) == 0
+        assert len(caster.meet(origins[:0], unit[:0]).face) == 0
 
 
 def test_planes_along_rays() -> None:
     corner_m = np.array([[[0.0, 0, 2], [1, 0, 2], [0, 1, 2]], [[0.0, 0, 0], [0, 1, 0], [0, 0, 1]], [[1.0, 1, 1]] * 3])
     planes = Planes.of(corner_m)
     np.testing.assert_array_equal(planes.normal, [[0, 0, 1], [1, 0, 0], [0, 0, 0]])
-    assert planes.height_m(np.array([0.3, 0.0, 5.0])).tolist() == [3.0, 0.3, 0.0]
+    eye_m = np.array([[0.3, 0.0, 5.0]] * 3)
+    assert planes.height_m(eye_m).tolist() == [3.0, 0.3, 0.0]
     down = np.array([[0.0, 0, -1], [0.0, 0, -1], [0.0, 0, -1]])
     # The second ray runs along its plane, and the third triangle has none: what was found roughly counts.
-    assert planes.along_m(np.array([0.3, 0.0, 5.0]), down, np.full(3, 9, np.float32)).tolist() == [3.0, 9.0, 9.0]
+    assert planes.along_m(eye_m, down, np.full(3, 9, np.float32)).tolist() == [3.0, 9.0, 9.0]

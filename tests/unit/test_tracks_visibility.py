@@ -11,12 +11,13 @@ from synthetic_sequence import make_scene_tracks
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.pinhole import Intrinsics, inside_image, project
 from perpetua.geometry.planes import Planes
+from perpetua.tracks.around import ViewFrame
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.placed import PlacedPoints
 from perpetua.tracks.sides import ClosedSides, closed_sides
 from perpetua.tracks.sight import HairFaces, SceneSight, SightHits
 from perpetua.tracks.surface import SceneMeshes, plane_barycentric
-from perpetua.tracks.visibility import ViewFrame, visible_in_frame
+from perpetua.tracks.visibility import visible_in_frame
 
 CONFIG = TracksConfig()
 CAMERA = Intrinsics.centred(64, 48, 1.2)
@@ -65,7 +66,7 @@ def visible(
     config: TracksConfig = CONFIG,
     sides: ClosedSides | None = None,
 ) -> np.ndarray:
-    return visible_in_frame(placed(points, corners, sides), seen, ClearSight(), HairFaces({}), config)[0]
+    return visible_in_frame(placed(points, corners, sides), [seen], ClearSight(), HairFaces({}), config)[0][0]
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.9, -1.3])
@@ -210,15 +211,15 @@ def test_hidden_entries_are_counted_by_reason() -> None:
         corner_m = np.array([[-9.0, -9, 3 - gap_m], [9, -9, 3 - gap_m], [0, 18, 3 - gap_m]])
         sheet = TriMesh(corner_m, np.array([[0, 1, 2]], np.int32))
         sight = SceneSight(SceneMeshes({8: sheet}, {}, {}))
-        shown, report = visible_in_frame(placed(points, corners), seen, sight, HairFaces({}), CONFIG)
+        shown, report = visible_in_frame(placed(points, corners), [seen], sight, HairFaces({}), CONFIG)
         assert not shown.any() and getattr(report, wanted) == len(points) and report.visible == 0
-        _, strands = visible_in_frame(placed(points, corners), seen, sight, HairFaces({8: np.array([True])}), CONFIG)
+        _, strands = visible_in_frame(placed(points, corners), [seen], sight, HairFaces({8: np.array([True])}), CONFIG)
         assert strands.blocked_hair == len(points)
     elsewhere = ViewFrame(0, np.eye(4), CAMERA, seen.depth_m, np.full((48, 64), 8, np.uint16))
-    _, thin = visible_in_frame(placed(points, corners), elsewhere, ClearSight(), HairFaces({}), CONFIG)
+    _, thin = visible_in_frame(placed(points, corners), [elsewhere], ClearSight(), HairFaces({}), CONFIG)
     assert thin.unseen_thin == len(points)
     moved = ViewFrame(0, np.eye(4), CAMERA, seen.depth_m - np.float32(0.05), seen.object_index)
-    _, other = visible_in_frame(placed(points, corners), moved, ClearSight(), HairFaces({}), CONFIG)
+    _, other = visible_in_frame(placed(points, corners), [moved], ClearSight(), HairFaces({}), CONFIG)
     assert other.unseen_otherwise == len(points)
 
 
@@ -235,10 +236,10 @@ def test_a_rim_between_pixels_is_counted_as_an_edge() -> None:
     weight[:, :2] *= 0.5 / weight[:, :2].sum(axis=1, keepdims=True)
     on_ridge = placed(weight @ ridge_m, np.repeat(ridge_m[None], 50, axis=0))
     on_ridge = dataclasses.replace(on_ridge, face=np.ones(50, np.int32))
-    shown, report = visible_in_frame(on_ridge, seen, sight, HairFaces({}), CONFIG)
+    shown, report = visible_in_frame(on_ridge, [seen], sight, HairFaces({}), CONFIG)
     assert not shown.any() and report.unseen_edge == 50, report
     bent = ViewFrame(0, np.eye(4), CAMERA, seen.depth_m + np.float32(0.5), seen.object_index)
-    assert visible_in_frame(on_ridge, bent, sight, HairFaces({}), CONFIG)[1].unseen_otherwise == 50
+    assert visible_in_frame(on_ridge, [bent], sight, HairFaces({}), CONFIG)[1].unseen_otherwise == 50
 
 
 def test_projection_uses_the_exported_values() -> None:
