@@ -27,7 +27,7 @@ class AuditConfig(Section):
         0.02, ge=0.0, le=1.0, description="largest share of entries called hidden although depth shows their surface"
     )
     seen_through: float = Field(
-        0.01, ge=0.0, le=1.0, description="largest share of pixels whose surface another view sees through"
+        0.03, ge=0.0, le=1.0, description="largest share of pixels whose surface another view sees through"
     )
     max_depth_m: float = Field(100.0, gt=0.0, description="largest depth of an indoor scene, metres")
     rotation_error: float = Field(1e-5, gt=0.0, description="largest entry of R times its transpose minus identity")

@@ -11,8 +11,8 @@ from perpetua.audit.report import Check
 from perpetua.audit.tally import Tally, check_of, chosen_frames
 from perpetua.audit.visibility_checks import AROUND
 
-# Every so many pixels along each side are looked at in other views.
-STRIDE_PX = 4
+# About so many pixels along each side are looked at in other views.
+LOOKED_AT_PX = 128
 # What labels at the pixel centres around a track may differ from what it does itself.
 MOVES_M, MOVES_SHARE = 0.01, 0.2
 FLOWS_PX, FLOWS_SHARE = 0.5, 0.1
@@ -25,20 +25,31 @@ def check_views_agree(files: SequenceFiles, bounds: AuditConfig) -> Check:
     through = Tally("shows a surface that another view sees through", 1.0 - bounds.seen_through)
     for view in files.views:
         for frame in chosen_frames(len(files.arrays[f"{view}/depth.npy"])):
-            shown = np.asarray(files.arrays[f"{view}/depth.npy"][frame, ::STRIDE_PX, ::STRIDE_PX]) > 0.0
-            world_m = world_of_pixels(files, view, frame)[::STRIDE_PX, ::STRIDE_PX]
+            _, height, width = files.arrays[f"{view}/depth.npy"].shape
+            stride = max(1, max(height, width) // LOOKED_AT_PX)
+            shown = np.asarray(files.arrays[f"{view}/depth.npy"][frame, ::stride, ::stride]) > 0.0
+            world_m = world_of_pixels(files, view, frame)[::stride, ::stride]
             for other in files.views:
-                if other == view:
-                    continue
-                camera = files.arrays[f"{other}/intrinsics.npy"], files.arrays[f"{other}/extrinsics_w2c.npy"][frame]
-                seen = project_to_pixels(*camera, world_m.reshape(-1, 3)).reshape(world_m.shape)
-                around_m, complete = depth_around(files, other, frame, seen[..., :2])
-                ahead_m = seen[..., 2]
-                allowed_m = bounds.depth_tolerance_m + bounds.depth_tolerance_share * ahead_m
-                before = ahead_m < around_m.min(axis=-1) - allowed_m
-                tested = shown & complete & (ahead_m > 0.0)
-                through.add(f"{view}/depth.npy[{frame} (every {STRIDE_PX}th pixel), view {other}", before, tested)
+                if other != view:
+                    before, tested = _before_surfaces(files, other, frame, world_m, bounds)
+                    through.add(
+                        f"{view}/depth.npy[{frame} (every {stride}th pixel), view {other}", before, tested & shown
+                    )
     return check_of("views agree", [through])
+
+
+def _before_surfaces(
+    files: SequenceFiles, view: str, frame: int, world_m: Float64[np.ndarray, "H W 3"], bounds: AuditConfig
+) -> tuple[Bool[np.ndarray, "H W"], Bool[np.ndarray, "H W"]]:
+    """Which points lie before what a view shows in their direction, and which of them it looks at."""
+    intrinsics = files.arrays[f"{view}/intrinsics.npy"]
+    camera = intrinsics, files.arrays[f"{view}/extrinsics_w2c.npy"][frame]
+    seen = project_to_pixels(*camera, world_m.reshape(-1, 3)).reshape(world_m.shape)
+    around_m, complete = depth_around(files, view, frame, seen[..., :2])
+    ahead_m = seen[..., 2]
+    # Between pixel centres a surface may bend by as much as a pixel is wide.
+    allowed_m = bounds.depth_tolerance_m + (bounds.depth_tolerance_share + 1.5 / float(intrinsics[0])) * ahead_m
+    return ahead_m < around_m.min(axis=-1) - allowed_m, complete & (ahead_m > 0.0)
 
 
 def check_index_of_tracks(files: SequenceFiles, owner: Int64[np.ndarray, " P"]) -> Check:

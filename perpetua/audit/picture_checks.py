@@ -21,8 +21,8 @@ FEWEST = 24
 # Another image fits a frame better when its colours are off by less than this share of the own image's, and by at least
 # so much less; colours are natural logarithms.
 BETTER_SHARE, BETTER_BY = 0.55, 0.01
-# Colours of tracks that two views see have at least this correlation.
-LEAST_CORRELATION = 0.3
+# Two views' images belong to each other when the colours of common tracks correlate by so much more that way.
+BETTER_CORRELATION = 0.4
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class _View:
 
 
 def check_pictures(files: SequenceFiles) -> Check:
-    """No image fits another frame of its view much better than the image that is there, and views agree on colours."""
+    """No image fits another frame of its view much better than the image that is there, nor another view's frames."""
     faults: list[str] = []
     worst = 0.0
     views = [_look(files, view) for view in files.views]
@@ -48,8 +48,8 @@ def check_pictures(files: SequenceFiles) -> Check:
             worst = max(worst, 1.0 - other / max(own, 1e-9) if own - other > BETTER_BY else 0.0)
             if other < BETTER_SHARE * own and own - other > BETTER_BY:
                 faults.append(f"{view.name}/images_jpeg_bytes.npy[{best}] fits frame {frame} better than its own image")
-    faults += _strangers(views)
-    bound = f"no image {1.0 - BETTER_SHARE:.0%} better elsewhere, colours of views correlate by {LEAST_CORRELATION:g}"
+    faults += _exchanged(files, views)
+    bound = f"no image fits {1.0 - BETTER_SHARE:.0%} better elsewhere"
     return Check("images of their frames", not faults, worst, bound, "; ".join(faults[:3]))
 
 
@@ -57,17 +57,27 @@ def _look(files: SequenceFiles, name: str) -> _View:
     tracks = files.arrays["tracks_xyz.npy"][:, :TRACKS]
     visible = np.asarray(files.arrays[f"{name}/visibility.npy"][:, :TRACKS])
     pixel_px = np.empty((*visible.shape, 2), np.float32)
-    shown = np.full((*visible.shape, 3), np.nan, np.float32)
     for frame in range(len(tracks)):
         camera = files.arrays[f"{name}/intrinsics.npy"], files.arrays[f"{name}/extrinsics_w2c.npy"][frame]
         seen = project_to_pixels(*camera, tracks[frame])[:, :2]
         pixel_px[frame] = np.nan_to_num(seen, nan=0.0).clip(0.0, 16_000.0)
+    return _View(name, pixel_px, visible, _colours(files.jpegs[name], pixel_px, visible))
+
+
+def _colours(
+    jpegs: tuple[UInt8[np.ndarray, " _"], ...],
+    pixel_px: Float32[np.ndarray, "F P 2"],
+    visible: Bool[np.ndarray, "F P"],
+) -> Float64[np.ndarray, "P 3"]:
+    """What images show of tracks where they are visible, in the median; NaN for tracks that never are."""
+    shown = np.full((*visible.shape, 3), np.nan, np.float32)
+    for frame, jpeg in enumerate(jpegs):
         at = np.flatnonzero(visible[frame])
-        shown[frame, at] = _sample(_decode(files.jpegs[name][frame]), pixel_px[frame, at])
+        shown[frame, at] = _sample(_decode(jpeg), pixel_px[frame, at])
     colour = np.full((visible.shape[1], 3), np.nan)
     known = visible.any(axis=0)
     colour[known] = np.nanmedian(shown[:, known], axis=0)
-    return _View(name, pixel_px, visible, colour)
+    return colour
 
 
 def _errors(files: SequenceFiles, view: _View) -> Float64[np.ndarray, "F F"]:
@@ -84,21 +94,33 @@ def _errors(files: SequenceFiles, view: _View) -> Float64[np.ndarray, "F F"]:
     return error
 
 
-def _strangers(views: list[_View]) -> list[str]:
-    """Pairs of views whose common tracks have other colours in each."""
+def _exchanged(files: SequenceFiles, views: list[_View]) -> list[str]:
+    """Pairs of views whose images fit much better the other way round."""
     faults = []
     for place, first in enumerate(views):
         for second in views[place + 1 :]:
-            both = np.isfinite(first.colour).all(axis=1) & np.isfinite(second.colour).all(axis=1)
-            seen = np.stack([first.colour[both].ravel(), second.colour[both].ravel()])
-            if both.sum() >= FEWEST and (seen.std(axis=1) > 0.1).all():
-                correlation = float(np.corrcoef(seen)[0, 1])
-                if correlation < LEAST_CORRELATION:
-                    faults.append(
-                        f"images_jpeg_bytes.npy of views {first.name} and {second.name}: colours of the {both.sum()} "
-                        f"tracks that both see correlate by {correlation:.2f}"
-                    )
+            own = _correlation(first.colour, second.colour)
+            if own is None or own > 1.0 - BETTER_CORRELATION:
+                continue
+            turned = _correlation(
+                _colours(files.jpegs[second.name], first.pixel_px, first.visible),
+                _colours(files.jpegs[first.name], second.pixel_px, second.visible),
+            )
+            if turned is not None and turned - own > BETTER_CORRELATION:
+                faults.append(
+                    f"images_jpeg_bytes.npy of views {first.name} and {second.name} fit the other way round: colours "
+                    f"of common tracks correlate by {own:.2f} as they are, and by {turned:.2f} exchanged"
+                )
     return faults
+
+
+def _correlation(first: Float64[np.ndarray, "P 3"], second: Float64[np.ndarray, "P 3"]) -> float | None:
+    """Of the colours of tracks that both views see; None where too few are, or they are all alike."""
+    both = np.isfinite(first).all(axis=1) & np.isfinite(second).all(axis=1)
+    seen = np.stack([first[both].ravel(), second[both].ravel()])
+    if both.sum() < FEWEST or (seen.std(axis=1) < 0.1).any():
+        return None
+    return float(np.corrcoef(seen)[0, 1])
 
 
 def _decode(jpeg: UInt8[np.ndarray, " _"]) -> Float32[np.ndarray, "H W 3"]:

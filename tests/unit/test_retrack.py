@@ -41,7 +41,8 @@ def test_any_number_is_written_as_a_whole_sequence_that_passes(sequence: Path, t
 
 def test_pixels_are_followed_from_their_centres(sequence: Path, tmp_path: Path) -> None:
     view, frame, step = 1, 3, 4
-    made = write_other_tracks(sequence, tmp_path / "pixels", 1, 0, PixelChoice(view, frame, step))
+    made = write_other_tracks(sequence, tmp_path / "pixels", 1, 0, PixelChoice(view, frame, step), ("flow",))
+    assert np.load(tmp_path / "pixels/1/flow.npy").shape == (5, 72, 96, 2)
     camera = make_scene().cameras[view]
     in_camera_m = transform_points(invert_rigid(camera.world_from_camera)[frame], made.points.position_m[frame])
     pixel_px = project(camera.intrinsics, in_camera_m)

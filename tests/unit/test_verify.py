@@ -308,7 +308,7 @@ FAULTS: dict[str, tuple[Fault, str, str]] = {
     "images of views swapped": (
         swap("0/images_jpeg_bytes.npy", "1/images_jpeg_bytes.npy"),
         "images of their frames",
-        "of views 0 and 2",
+        "of views 0 and 1 fit the other way round",
     ),
     "a camera that stands elsewhere": (
         change("2/extrinsics_w2c.npy", shifted(0.3)),
