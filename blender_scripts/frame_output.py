@@ -12,12 +12,15 @@ GROUND_TRUTH_PREFIX = "ground_truth_"
 
 
 class Picture:
-    """Develops a scene's renders: exposure and white balance, the sensor's noise, the view transform, JPEG."""
+    """Develops a scene's renders: exposure and white balance, the sensor's noise, the view transform, JPEG.
+
+    Exposure is a factor in linear light rather than the view's own, so that noise can come after it.
+    """
 
     def __init__(self, scene: bpy.types.Scene, settings: dict) -> None:
         self._scene = scene
         self._sensor = settings["sensor"]
-        tree = _tree_of(scene)
+        tree = scene.node_tree
         self._gains = tree.nodes.new("CompositorNodeMixRGB")
         self._gains.blend_type = "MULTIPLY"
         tree.links.new(_layers_of(tree).outputs["Image"], self._gains.inputs[1])
@@ -85,7 +88,7 @@ class GroundTruth:
         self._scene = scene
         layer = scene.view_layers[0]
         layer.use_pass_z = layer.use_pass_object_index = True
-        tree = _tree_of(scene)
+        tree = scene.node_tree
         self._file = _exr_node(tree)
         tree.links.new(_layers_of(tree).outputs["Depth"], self._file.inputs["depth"])
         tree.links.new(_layers_of(tree).outputs["IndexOB"], self._file.inputs["index"])
@@ -118,10 +121,6 @@ def empty_tree(scene: bpy.types.Scene) -> None:
     scene.render.use_compositing = True
     scene.node_tree.nodes.clear()
     scene.node_tree.nodes.new("CompositorNodeRLayers").scene = scene
-
-
-def _tree_of(scene: bpy.types.Scene) -> bpy.types.NodeTree:
-    return scene.node_tree
 
 
 def _layers_of(tree: bpy.types.NodeTree) -> bpy.types.Node:
