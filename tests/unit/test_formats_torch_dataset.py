@@ -137,11 +137,11 @@ def test_same_size_changes_no_pixel() -> None:
 def test_workers_give_the_same_batches(made: tuple[Path, Scene, Sequence]) -> None:
     clips = SequenceDataset([made[0]], views=(1,), clip_frames=2, size_px=(32, 24))
     batches = list(DataLoader(clips, batch_size=3, num_workers=2))
-    assert len(batches) == 1 and batches[0].images.shape == (3, 1, 2, 3, 24, 32)
+    assert len(batches) == 1 and batches[0].images.shape == (3, 1, 2, 3, 24, 32) and batches[0].labels == {}
     for row in range(len(clips)):
         clip = clips[row]
         for field, batch in zip(clip._fields, batches[0], strict=True):
-            if field != "name":
+            if field not in ("name", "labels"):
                 torch.testing.assert_close(batch[row], getattr(clip, field), rtol=0, atol=0, equal_nan=True)
 
 
