@@ -17,13 +17,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from render_costs import FRAMES, STEPS, VIEWS, Costs, measure_costs
+from render_costs import STEPS, Costs, measure_costs
 from render_error import Error, measure_errors
 from render_look import Crop, compare_crops, render_pair
-from render_scenes import Scene, load_scene, spent_by_children
+from render_scenes import FRAMES, VIEWS, Scene, bake_scene, load_scene, spent_by_children
 
 from perpetua.files import read_json, write_json
-from perpetua.rendering.bake import bake_room
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
 
@@ -55,7 +54,8 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--to", type=Path, required=True, metavar="DIR", help="folder of the results")
     parser.add_argument("--width", type=int, default=None, help="image width; costs: 192, else 512")
     parser.add_argument("--samples", type=int, default=None, help="costs: 16, look: 512, memory: 32")
-    parser.add_argument("--max-texels", type=int, default=None, help="render.max_texels of look, errors and memory")
+    parser.add_argument("--bake-width", type=int, default=512, help="width of the images that rooms are baked for")
+    parser.add_argument("--max-texels", type=int, default=RenderConfig().max_texels, help="render.max_texels")
     parser.add_argument("--pair-samples", type=int, default=24, help="samples of the pairs to look at")
     parser.add_argument("--crop", type=int, default=64, help="side of the crops, pixels")
     return parser.parse_args()
@@ -68,7 +68,7 @@ def _config(options: argparse.Namespace, width_px: int, samples: int) -> RenderC
 
 def _costs(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
     config = _config(options, 192, 16)
-    results = [measure_costs(scene, config) for scene in scenes]
+    results = [measure_costs(scene, config, *_bake(options, scene)) for scene in scenes]
     lines = [
         f"# CPU seconds per image of {config.width_px} x {config.height_px} px at {config.samples} samples, denoised",
         "",
@@ -113,20 +113,15 @@ def _costs_row(cost: Costs) -> str:
     return _row([cost.name, str(cost.objects), *steps, f"{cost.ratio:.1f}", *walls, f"{cost.bake_cpu_s:.0f}", *peaks])
 
 
-def _baked(options: argparse.Namespace, scene: Scene) -> tuple[Path, RenderConfig]:
-    """The room baked for a whole sequence of full-size images, and the settings of these."""
-    config = _config(options, 512, 32)
-    cameras = scene.at(config.width_px).cameras
-    texels = options.max_texels or config.max_texels
-    budgeted = config.model_copy(update={"samples": 32, "max_texels": texels})
-    return bake_room(scene.room, cameras, budgeted, FRAMES * VIEWS, scene.folder / "baked"), config
+def _bake(options: argparse.Namespace, scene: Scene) -> tuple[Path, float]:
+    return bake_scene(scene, options.bake_width, options.max_texels)
 
 
 def _look(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
     samples = options.samples or 512
     crops: list[Crop] = []
     for scene in scenes:
-        baked, config = _baked(options, scene)
+        baked, config = _bake(options, scene)[0], _config(options, 512, 32)
         render_pair(scene, baked, config, options.pair_samples, None)
         crops += compare_crops(scene, baked, config, options.crop, samples)
     values = [crop.ssim for crop in crops]
@@ -147,7 +142,7 @@ def _look(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
 def _errors(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
     errors: list[Error] = []
     for scene in scenes:
-        baked, config = _baked(options, scene)
+        baked, config = _bake(options, scene)[0], _config(options, 512, 32)
         errors += measure_errors(scene, baked, config, options.crop)
     return [
         f"# Error at equal time, crops of {options.crop} px",
@@ -166,7 +161,7 @@ def _memory(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
     for scene in scenes:
         path = scene.folder / "memory.json"
         if not path.is_file():
-            baked, config = _baked(options, scene)
+            baked, config = _bake(options, scene)[0], _config(options, 512, 32)
             part = replace(scene.at(config.width_px).first_frames(1), room=replace(scene.room, blend_path=baked))
             few = config.model_copy(update={"samples": 4, "bake": False})
             with spent_by_children() as spent:

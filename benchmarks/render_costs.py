@@ -4,15 +4,12 @@ import shutil
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from render_scenes import Image, Loop, Rendered, Scene, run_loop, spent_by_children
+from render_scenes import FRAMES, VIEWS, Image, Loop, Rendered, Scene, run_loop, spent_by_children
 
 from perpetua.files import read_json, write_json
-from perpetua.rendering.bake import bake_room
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
 
-# A sequence over which what is paid once is spread.
-FRAMES, VIEWS = 240, 4
 # Frames of ours that are rendered: from the difference of two lengths follow a frame's cost and what is paid once.
 SHORT, LONG = 1, 3
 STEPS = ("plain loop", "synchronisation", "modifiers", "baking", "sampling")
@@ -53,7 +50,7 @@ class Costs:
         return self.steps[STEPS[0]].image_cpu_s / self.steps[STEPS[-1]].image_cpu_s
 
 
-def measure_costs(scene: Scene, config: RenderConfig) -> Costs:
+def measure_costs(scene: Scene, config: RenderConfig, baked: Path, bake_cpu_s: float) -> Costs:
     """Renders few images of a scene in every way; a result that is there already is used again.
 
     The plain loop renders two images, as each costs the same. With data that persist, a first image at one sample
@@ -62,9 +59,6 @@ def measure_costs(scene: Scene, config: RenderConfig) -> Costs:
     path = scene.folder / f"costs_{config.width_px}_{config.samples}.json"
     if stored := read_json(path):
         return Costs(**{**stored, "steps": {name: Step(**step) for name, step in stored["steps"].items()}})
-    with spent_by_children() as baking:
-        cameras = scene.at(config.width_px).cameras
-        baked = bake_room(scene.room, cameras, config, FRAMES * VIEWS, scene.folder / "baked")
     scene = replace(scene.at(config.width_px, LONG), folder=scene.folder / f"costs_{config.width_px}")
     images = [Image("first", 1, 0, config.samples), Image("second", 2, 1, config.samples)]
     plain = run_loop(scene, Loop("plain", scene.as_made, False, "blender", True), images, config)
@@ -73,7 +67,6 @@ def measure_costs(scene: Scene, config: RenderConfig) -> Costs:
         "modifiers": _persistent(scene, Loop("applied", _blend(scene), True, "blender", True), config),
         "baking": _persistent(scene, Loop("baked", baked, True, "blender", True), config),
     }
-    bake_cpu_s = baking.cpu_s
     kept["baking"] = replace(kept["baking"], once_cpu_s=kept["baking"].once_cpu_s + bake_cpu_s)
     ours, wall_s, peak_mb = _ours(scene, baked, config, bake_cpu_s)
     first, second = plain.images()["first"], plain.images()["second"]

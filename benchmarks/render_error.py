@@ -10,7 +10,8 @@ from render_scenes import Image, Loop, Scene, run_loop
 from perpetua.rendering.config import RenderConfig
 
 REFERENCE_SAMPLES = 1024
-BUDGETS_S = (10.0, 20.0, 40.0)
+# For images of 512 x 512; smaller ones get as much less as they have fewer pixels.
+BUDGETS_S, BUDGET_PX = (10.0, 20.0, 40.0), 512 * 512
 PROBES = (2, 8)
 # The plain loop renders this much around the crop, so that its denoiser sees a neighbourhood too.
 SURROUNDINGS_PX = 56
@@ -68,7 +69,8 @@ def _errors_of_ours(scene: Scene, loop: Loop, config: RenderConfig, border: Bord
         scene, replace(loop, name="error_probe"), [warm, *(Image(f"{n}", frame, 0, n) for n in PROBES)], config
     )
     fixed_s, sample_s = _line([float(probes.images()[f"{n}"]["cpu_s"]) for n in PROBES])
-    counts = [max(1, int((budget_s - fixed_s) / sample_s)) for budget_s in BUDGETS_S]
+    budgets_s = [budget_s * config.width_px * config.height_px / BUDGET_PX for budget_s in BUDGETS_S]
+    counts = [max(1, int((budget_s - fixed_s) / sample_s)) for budget_s in budgets_s]
     images = [Image(f"budget_{n}", frame, 0, n) for n in counts]
     rendered = run_loop(scene, loop, [warm, *images], config)
     left, top, right, bottom = border
@@ -89,7 +91,8 @@ def _errors_of_plain(scene: Scene, loop: Loop, config: RenderConfig, border: Bor
     fixed_s, part_s = _line([float(probes.images()[f"{n}"]["cpu_s"]) for n in PROBES])
     share = (around[2] - around[0]) * (around[3] - around[1]) / (config.width_px * config.height_px)
     sample_s = part_s / share
-    counts = [max(1, int((budget_s - fixed_s) / sample_s)) for budget_s in BUDGETS_S]
+    budgets_s = [budget_s * config.width_px * config.height_px / BUDGET_PX for budget_s in BUDGETS_S]
+    counts = [max(1, int((budget_s - fixed_s) / sample_s)) for budget_s in budgets_s]
     errors = []
     for denoise, way in ((False, "plain"), (True, "plain, denoised")):
         images = [Image(f"{n}", frame, 0, n, around) for n in sorted(set(counts))]

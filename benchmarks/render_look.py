@@ -9,6 +9,7 @@ from PIL import Image as Pillow
 from render_scenes import Image, Loop, Scene, run_loop
 from scipy.ndimage import gaussian_filter
 
+from perpetua.files import read_json, write_json
 from perpetua.rendering.config import RenderConfig
 
 # Luma of sRGB pictures (Rec. 601), and the constants of Wang, Bovik, Sheikh and Simoncelli 2004.
@@ -81,7 +82,10 @@ def compare_crops(
 def choose_borders(
     scene: Scene, baked: Path, config: RenderConfig, frame: int, crop_px: int, exposure_ev: float | None
 ) -> tuple[list[tuple[int, int, int, int]], float]:
-    """A crop of each view, and the exposure metered on the first."""
+    """A crop of each view, and the exposure metered on the first; chosen once."""
+    path = scene.folder / f"crops_{config.width_px}_{crop_px}.json"
+    if stored := read_json(path):
+        return [tuple(border) for border in stored["borders"]], stored["exposure_ev"]
     small = replace(scene.at(CHOICE_PX), actors=())
     images = [Image(f"camera_{camera.camera}", frame, camera.camera, CHOICE_SAMPLES) for camera in scene.cameras]
     rendered = run_loop(small, Loop("look_choice", baked, True, "ours", True, exposure_ev), images, config)
@@ -95,7 +99,9 @@ def choose_borders(
         left, top = (round(at * config.width_px / CHOICE_PX) for at in (column, row))
         left, top = min(left, config.width_px - crop_px), min(top, config.height_px - crop_px)
         borders.append((left, top, left + crop_px, top + crop_px))
-    return borders, float(rendered.one("exposure")["exposure_ev"])
+    exposure_ev = float(rendered.one("exposure")["exposure_ev"])
+    write_json(path, {"borders": borders, "exposure_ev": exposure_ev})
+    return borders, exposure_ev
 
 
 def render_pair(scene: Scene, baked: Path, config: RenderConfig, samples: int, exposure_ev: float | None) -> Path:

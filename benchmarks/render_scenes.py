@@ -26,6 +26,7 @@ from perpetua.pipeline.memory import PeakMemory
 from perpetua.pipeline.runner import rejected_draws
 from perpetua.pipeline.stages import STAGES
 from perpetua.pipeline.store import StageFolder
+from perpetua.rendering.bake import bake_room
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.job import write_job
 from perpetua.rooms.build import REPORT_FILE
@@ -216,6 +217,21 @@ def run_loop(scene: Scene, loop: Loop, images: list[Image], render: RenderConfig
     )
     write_json(folder / "done.json", {"events": events})
     return Rendered(tuple(events), folder)
+
+
+FRAMES, VIEWS = 240, 4
+
+
+def bake_scene(scene: Scene, width_px: int, max_texels: int) -> tuple[Path, float]:
+    """The room baked for a whole sequence of images of a width; and the CPU seconds that this took, once."""
+    config = RenderConfig(width_px=width_px, height_px=width_px, max_texels=max_texels)
+    with spent_by_children() as spent:
+        cameras = scene.at(width_px).cameras
+        baked = bake_room(scene.room, cameras, config, FRAMES * VIEWS, scene.folder / "baked")
+    path = baked.with_suffix(".cost.json")
+    if not path.is_file():
+        write_json(path, {"cpu_s": spent.cpu_s})
+    return baked, float(read_json(path)["cpu_s"])
 
 
 class Spent:

@@ -89,8 +89,15 @@ def _users() -> list[tuple[list[bpy.types.Object], frozenset[int]]]:
 def _is_bakeable(material: bpy.types.Material | None) -> bool:
     if material is None or not material.use_nodes or material.node_tree.get_output_node("CYCLES") is None:
         return False
-    kinds = {node.type for node in all_nodes(material.node_tree)}
-    return bool(kinds & PROCEDURAL) and not kinds & LAMPS
+    nodes = all_nodes(material.node_tree)
+    kinds = {node.type for node in nodes}
+    return bool(kinds & PROCEDURAL) and not kinds & LAMPS and not any(map(_shines, nodes))
+
+
+def _shines(node: bpy.types.Node) -> bool:
+    """Whether a surface shader gives light of its own, as a screen does."""
+    strength = node.inputs.get("Emission Strength") if node.type == "BSDF_PRINCIPLED" else None
+    return strength is not None and (strength.is_linked or strength.default_value > 0.0)
 
 
 def _plan(

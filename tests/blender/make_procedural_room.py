@@ -1,7 +1,7 @@
 """Writes a .blend with procedural and plain materials: ``python make_procedural_room.py room.blend``.
 
 Two boards share one mesh: checks of 0.5 m in object space, inside two nested groups and a mixture of shaders. A third
-one is plain green. A lamp shines on them.
+one is plain green, a fourth is a screen that shines in checks. A lamp shines on them.
 """
 
 import sys
@@ -63,6 +63,19 @@ def plain_material() -> bpy.types.Material:
     return material
 
 
+def screen_material() -> bpy.types.Material:
+    """A black surface that gives light of its own, in checks."""
+    material = bpy.data.materials.new("screen")
+    material.use_nodes = True
+    tree = material.node_tree
+    shader, checker = tree.nodes["Principled BSDF"], tree.nodes.new("ShaderNodeTexChecker")
+    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = GREEN, BLUE
+    shader.inputs["Base Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+    shader.inputs["Emission Strength"].default_value = 3.0
+    tree.links.new(checker.outputs["Color"], shader.inputs["Emission Color"])
+    return material
+
+
 def main() -> None:
     """Builds and saves the scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -72,9 +85,12 @@ def main() -> None:
     mesh.materials.append(checked_material())
     plain = mesh.copy()
     plain.materials[0] = plain_material()
-    for index, (data, x) in enumerate([(mesh, -2.1), (mesh, 0.0), (plain, 2.1)], start=1):
+    screen = mesh.copy()
+    screen.materials[0] = screen_material()
+    places = [(mesh, -2.1, 0.0), (mesh, 0.0, 0.0), (plain, 2.1, 0.0), (screen, 0.0, 2.1)]
+    for index, (data, x, y) in enumerate(places, start=1):
         thing = bpy.data.objects.new(f"board_{index}", data)
-        thing.location, thing.pass_index = (x, 0.0, 0.0), index
+        thing.location, thing.pass_index = (x, y, 0.0), index
         scene.collection.objects.link(thing)
     lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "AREA"))
     lamp.location, lamp.data.energy, lamp.data.size = (0.5, 0.3, 3.0), 300.0, 2.0

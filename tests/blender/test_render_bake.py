@@ -46,12 +46,12 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Room:
             k,
             f"board_{k}",
             "board",
-            TriMesh(corners_m + np.array([2.1 * (k - 2), 0.0, 0.0]), np.array([[0, 1, 2], [0, 2, 3]], np.int32)),
+            TriMesh(corners_m + np.array([x_m, y_m, 0.0]), np.array([[0, 1, 2], [0, 2, 3]], np.int32)),
             None,
             False,
             True,
         )
-        for k in (1, 2, 3)
+        for k, (x_m, y_m) in enumerate([(-2.1, 0.0), (0.0, 0.0), (2.1, 0.0), (0.0, 2.1)], start=1)
     )
     return Room("boards", "livingroom", np.zeros((4, 2)), 2.5, boards, (), blend)
 
@@ -76,14 +76,16 @@ def test_a_baked_room_looks_the_same(
     monkeypatch.setattr(bake, "MIN_TEXELS", 60_000)
     with caplog.at_level(logging.INFO):
         baked = _render(room, CONFIG, tmp_path / "baked")
-    # The two boards that share a mesh share its images; the plain board needs none.
+    # The two boards that share a mesh share its images; the plain board and the screen need none.
     assert "baked 4 images" in caplog.text
     plain = _render(room, CONFIG.model_copy(update={"bake": False}), tmp_path / "plain")
     np.testing.assert_array_equal(baked.depth_m, plain.depth_m)
     np.testing.assert_array_equal(baked.object_index, plain.object_index)
     difference = np.abs(_picture(baked) - _picture(plain))
-    for index in (1, 2, 3):
+    for index in (1, 2, 3, 4):
         assert difference[plain.object_index[0] == index].mean() < 5.0
+    # The screen shines.
+    assert _picture(baked)[plain.object_index[0] == 4].max() > 100.0
     # The checks are there: an edge of the original is an edge of the baked picture.
     seen = plain.object_index[0] == 2
     reds = _picture(plain)[..., 0][seen], _picture(baked)[..., 0][seen]
