@@ -33,7 +33,7 @@ from perpetua.rooms.types import Room
 from perpetua.system_libraries import require_libraries
 
 # Enough to judge a room by, and little work: few samples, few bounces, and materials baked coarsely.
-PICTURES = {"samples": 12, "max_bounces": 3, "noise_threshold": 0.1, "bake": True, "max_texels": 400_000}
+PICTURES = {"samples": 12, "max_bounces": 3, "noise_threshold": 0.1, "bake": True, "max_texels": 200_000}
 # What is in no room, in the view from above.
 PAPER = (238, 236, 231)
 VIEW_NAMES = ("above", "corner_1", "corner_2")

@@ -23,8 +23,8 @@ logger = logging.getLogger(__name__)
 BAKE_SCRIPT = SCRIPT_FOLDER / "bake_materials.py"
 # Fewer samples than this in all cost less than baking does.
 MIN_SAMPLES = 2_000_000
-# Baking stays a small part of rendering: a texel costs about as much as one or two samples of the original shaders, and
-# each of so many samples ahead becomes many times cheaper.
+# Baking stays a small part of rendering: a texel costs about as much as one sample with the original shaders, and each
+# of so many samples ahead becomes many times cheaper.
 SAMPLES_PER_TEXEL = 40
 # Textures with fewer texels than this look blurred at any resolution.
 MIN_TEXELS = 600_000
