@@ -10,7 +10,7 @@ from perpetua.commands import check, convert, look, machine, run
 from perpetua.errors import InputError, PerpetuaError
 
 SECTIONS = {
-    "Make": (run.generate, run.status, run.clean),
+    "Make": (run.generate, run.submit, run.status, run.clean),
     "Look": (look.preview, look.view, look.report),
     "Check": (check.verify, check.evaluate),
     "Write in other ways": (convert.tracks, convert.export),

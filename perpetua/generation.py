@@ -16,7 +16,7 @@ from perpetua.cluster.local import raise_on_sigterm, run_rooms
 from perpetua.cluster.outcome import RoomWork
 from perpetua.config import Config
 from perpetua.errors import ConfigError, InputError, PerpetuaError
-from perpetua.files import read_json
+from perpetua.files import read_json, write_json
 from perpetua.formats.reader import read_sequence
 from perpetua.pictures.contact_sheet import write_contact_sheet
 from perpetua.pipeline.cost import Cost, check_disk, estimate_cost, gigabytes
@@ -27,6 +27,7 @@ from perpetua.pipeline.lease import hold
 from perpetua.pipeline.progress import Progress
 from perpetua.pipeline.runner import RoomRun
 from perpetua.pipeline.stages import STAGE_NAMES, STAGES
+from perpetua.pipeline.store import StageFolder
 from perpetua.rendering.devices import auto_workers
 from perpetua.rooms.build import check_source
 from perpetua.system_libraries import require_libraries
@@ -99,15 +100,16 @@ def make_rooms(request: GenerateRequest, until: str, console: Console) -> dict[i
         KeyboardInterrupt: the user stopped the work; what is finished stays.
     """
     open_run(request.out, request.seed, request.rooms, request.config, request.replace)
-    memory_mb = estimate_cost(request.config, len(request.rooms)).room_memory_mb
-    work = RoomWork(partial(make_room, request, until), partial(room_folder, request), memory_mb)
+    work = room_work(request, until)
     workers = request.workers
     if workers == 0:
-        workers = auto_workers(len(request.rooms), request.device, free_memory_mb(), memory_mb)
+        workers = auto_workers(len(request.rooms), request.device, free_memory_mb(), work.memory_mb)
         _speaker(console)(f"rooms made at a time on this machine: {workers}")
     logging.getLogger("perpetua").setLevel(logging.INFO)
     with Progress(request.out / LOG_FILE, len(request.rooms), request.config.cameras.count, console) as progress:
-        return run_rooms(request.rooms, workers, work, progress.show)
+        failures = run_rooms(request.rooms, workers, work, progress.show)
+    note_failures(request, failures)
+    return failures
 
 
 def exit_code(request: GenerateRequest, failures: dict[int, str]) -> int:
@@ -127,6 +129,26 @@ def make_room(request: GenerateRequest, until: str, room: int, on_event: OnEvent
         with hold(layout.work_folder):
             if not layout.contact_sheet.exists():
                 _draw_contact_sheet(layout)
+
+
+def room_work(request: GenerateRequest, until: str) -> RoomWork:
+    """What is done with each room, in this process or another."""
+    memory_mb = estimate_cost(request.config, len(request.rooms)).room_memory_mb
+    return RoomWork(partial(make_room, request, until), partial(room_folder, request), memory_mb)
+
+
+def note_failures(request: GenerateRequest, failures: dict[int, str]) -> None:
+    """Leaves a note of failures that the room's own process could not note: it was killed, or met a fault of ours."""
+    for room, reason in failures.items():
+        layout = OutputLayout(request.out, request.config.export, request.seed, room)
+        if not layout.failure_file.exists():
+            failure = {"stage": _first_missing(layout), "reason": reason, "exit_code": PerpetuaError.exit_code}
+            write_json(layout.failure_file, failure)
+
+
+def _first_missing(layout: OutputLayout) -> str:
+    folders = {stage.name: StageFolder(layout.work_folder, stage.number, stage.name) for stage in STAGES}
+    return next((name for name, folder in folders.items() if folder.manifest() is None), STAGES[-1].name)
 
 
 def room_folder(request: GenerateRequest, room: int) -> Path:

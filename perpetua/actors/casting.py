@@ -2,6 +2,7 @@
 
 import logging
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import yaml
@@ -98,8 +99,14 @@ def action_descriptions(config: MotionConfig) -> tuple[str, ...]:
     lists = {path.stem: path for path in sorted(ACTION_FOLDER.glob("*.yaml"))}
     if config.actions not in lists:
         raise ConfigError(f"actors.motion.actions must be one of {list(lists)}, not '{config.actions}'")
-    content = yaml.safe_load(lists[config.actions].read_text(encoding="utf-8"))
+    path = lists[config.actions]
+    return _read_list(path, path.stat().st_mtime_ns)
+
+
+@lru_cache
+def _read_list(path: Path, changed_ns: int) -> tuple[str, ...]:
+    """Every room's keys depend on a list: it is parsed once, not once per room."""
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
     if not isinstance(content, list) or not content or not all(isinstance(line, str) for line in content):
-        path = lists[config.actions]
         raise ConfigError(f"'{path}' must be a list of action descriptions in plain words, one a line")
     return tuple(content)

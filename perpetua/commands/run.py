@@ -18,6 +18,7 @@ from perpetua.commands.options import (
     wide_console,
 )
 from perpetua.config import load_config
+from perpetua.errors import InputError
 
 
 def _complete_stages(context: click.Context, parameter: click.Parameter, typed: str) -> list[str]:
@@ -75,6 +76,90 @@ def generate(
         replace=replace,
     )
     sys.exit(run_generate(request, Console(), dry_run))
+
+
+@click.command(short_help="Make sequences on a Slurm cluster.")
+@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Decides everything drawn.")
+@click.option("--rooms", type=WholeNumber(1), default=1, show_default=True, help="How many sequences to make.")
+@click.option("--start-room", type=WholeNumber(0), default=0, show_default=True, help="Index of the first room.")
+@OUT_OPTION
+@PRESET_OPTION
+@CONFIG_OPTION
+@SET_OPTION
+@DEVICE_OPTION
+@click.option("--partition", help="Slurm partition of tasks that make pictures, and of all if no other is given.")
+@click.option("--geometry-partition", help="Slurm partition of tasks up to the cameras, which use no GPU.")
+@click.option("--cpus", type=WholeNumber(1), default=4, show_default=True, help="CPUs of a task.")
+@click.option("--mem", type=click.FloatRange(min=0, min_open=True), default=8, show_default=True, help="GB of a task.")
+@click.option("--gpus", type=WholeNumber(0), default=0, show_default=True,
+              help="GPUs of a task that makes pictures; it makes as many rooms at a time.")  # fmt: skip
+@click.option("--time", "minutes", type=WholeNumber(1), default=240, show_default=True,
+              help="Minutes until a task is stopped and queued again, to go on at the next frame.")  # fmt: skip
+@click.option("--array-parallelism", type=WholeNumber(1), default=256, show_default=True,
+              help="Tasks that run at a time.")  # fmt: skip
+@click.option("--rooms-per-task", type=WholeNumber(1), help="Default: as few as Slurm's limit of tasks allows.")
+@click.option("--python", help="What starts Python on a node, for example 'apptainer exec --nv perpetua.sif python3'.")
+@click.option("--sbatch", "sbatch", metavar="OPTION=VALUE", multiple=True,
+              help="A further option of sbatch, for example account=vision. Can be given several times.")  # fmt: skip
+@click.option("--replace", is_flag=True, help="Allow other settings than the ones the output folder was made with.")
+@click.option("--dry-run", is_flag=True, help="Say what would be scheduled, and schedule nothing.")
+def submit(
+    seed: int,
+    rooms: int,
+    start_room: int,
+    out: Path,
+    config_path: Path | None,
+    preset: str,
+    assignments: tuple[str, ...],
+    device: str,
+    partition: str | None,
+    geometry_partition: str | None,
+    cpus: int,
+    mem: float,
+    gpus: int,
+    minutes: int,
+    array_parallelism: int,
+    rooms_per_task: int | None,
+    python: str | None,
+    sbatch: tuple[str, ...],
+    replace: bool,
+    dry_run: bool,
+) -> None:
+    """Make sequences on a Slurm cluster, in a folder that all nodes share.
+
+    Up to the cameras rooms are made on CPUs by one array of tasks; a second one, each task after its own of the
+    first, makes pictures and all else. The same command again schedules what is missing, and not what is scheduled
+    still or running.
+    """
+    from perpetua.cluster.plan import Resources
+    from perpetua.generation import GenerateRequest
+    from perpetua.submission import SubmitRequest, run_submit
+
+    for option in sbatch:
+        if "=" not in option:
+            raise InputError(f"--sbatch takes OPTION=VALUE such as account=vision, not '{option}'")
+    generate = GenerateRequest(
+        config=load_config(preset, config_path, assignments),
+        seed=seed,
+        rooms=range(start_room, start_room + rooms),
+        until=None,
+        out=out,
+        workers=1,
+        device=device,
+        replace=replace,
+    )
+    resources = Resources(
+        partition=partition,
+        geometry_partition=partition if geometry_partition is None else geometry_partition,
+        cpus=cpus,
+        memory_gb=mem,
+        gpus=gpus,
+        minutes=minutes,
+        array_parallelism=array_parallelism,
+        rooms_per_task=rooms_per_task,
+    )
+    further = dict(option.split("=", 1) for option in sbatch)
+    run_submit(SubmitRequest(generate, resources, python, further), Console(), dry_run)
 
 
 @click.command(short_help="How far an output folder is: rooms by stages, failures, time left.")

@@ -55,6 +55,7 @@ class RoomRun:
             with hold(self.layout.work_folder) as self.lease:
                 # Another run may have made it since.
                 if not self._is_published():
+                    self.layout.failure_file.unlink(missing_ok=True)
                     self._run_draws(until)
         self.layout.failure_file.unlink(missing_ok=True)
         self._report("room_finished")

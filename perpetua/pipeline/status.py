@@ -10,26 +10,36 @@ from rich.table import Table
 
 from perpetua.files import read_json
 from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout, RunRecord, read_run
+from perpetua.pipeline.lease import LeaseWatch, read_lease
 from perpetua.pipeline.runner import published_redraw, rejected_draws, stage_keys
 from perpetua.pipeline.stages import STAGES
 from perpetua.pipeline.store import StageFolder
 
+# Of more rooms than this, those that are finished are not listed.
+_MOST_LISTED = 50
+
 
 @dataclass(frozen=True)
 class RoomStatus:
-    """How far one room is. ``seconds`` holds the time of each finished stage."""
+    """How far one room is. ``seconds`` holds the time of each finished stage.
+
+    ``worker`` is who works on it, as far as can be told: of another machine also one that just ended without a word.
+    """
 
     room: int
     finished: bool
     seconds: dict[str, float]
     failed_stage: str | None
     reason: str | None
+    worker: str | None
 
     @property
     def state(self) -> str:
         """One word for the room."""
         if self.finished:
             return "finished"
+        if self.worker is not None:
+            return "at work"
         if self.failed_stage is not None:
             return "failed"
         return "started" if self.seconds else "waiting"
@@ -58,6 +68,7 @@ class StatusReport:
     def notes(self) -> list[str]:
         """The reasons of failures and the time left, as lines."""
         lines = [f"room {room.room} failed in {room.failed_stage}: {room.reason}" for room in self.rooms if room.reason]
+        lines += [f"room {room.room} is at work: {room.worker}" for room in self.rooms if room.worker is not None]
         done = sum(room.finished for room in self.rooms)
         left = self.seconds_left
         time_left = "not known yet" if left is None else f"about {left / 60:.1f} min on one worker"
@@ -92,19 +103,25 @@ def _room_status(out: Path, run: RunRecord, room: int) -> RoomStatus:
         if manifest is not None and manifest.key == keys[stage.name]:
             seconds[stage.name] = manifest.seconds
     failure = read_json(layout.failure_file)
+    _, holder = read_lease(layout.work_folder)
     return RoomStatus(
         room=room,
         finished=published is not None,
         seconds=seconds,
         failed_stage=failure.get("stage"),
         reason=failure.get("reason"),
+        worker=None if holder is None or holder.is_over else str(holder),
     )
 
 
 def status_table(report: StatusReport) -> Table:
-    """Rooms by stages."""
+    """Rooms by stages; of many rooms those that are not finished."""
     table = Table("room", "state", *(stage.name for stage in STAGES))
+    if len(report.rooms) > _MOST_LISTED:
+        table.caption = "finished rooms are left out"
     for room in report.rooms:
+        if room.finished and len(report.rooms) > _MOST_LISTED:
+            continue
         cells = []
         for stage in STAGES:
             if stage.name in room.seconds:
@@ -120,6 +137,8 @@ def status_table(report: StatusReport) -> Table:
 def clean_work_area(out: Path, unfinished: bool) -> float:
     """Removes the work area of finished rooms, of all with ``unfinished``; returns the bytes freed.
 
+    A room that someone is working on is left alone.
+
     Raises:
         InputError: ``out`` holds no run.
     """
@@ -127,14 +146,17 @@ def clean_work_area(out: Path, unfinished: bool) -> float:
     report = read_status(out)
     freed = 0.0
     for room in report.rooms:
-        if room.finished or unfinished:
-            layout = OutputLayout(out, run.config.export, run.seed, room.room)
+        layout = OutputLayout(out, run.config.export, run.seed, room.room)
+        if (room.finished or unfinished) and LeaseWatch(layout.work_folder).is_free():
             freed += _remove(layout.work_folder)
             for left in layout.sequence_folder.parent.glob(f".{layout.sequence_folder.name}.*"):
                 freed += _remove(left)
     work_area = out / WORK_FOLDER
-    if work_area.exists() and not any(work_area.iterdir()):
-        work_area.rmdir()
+    # What is left when no room is at work or to be made: the files of Slurm's tasks, and the leases of their folders.
+    if unfinished or all(room.finished for room in report.rooms):
+        in_use = [OutputLayout(out, run.config.export, run.seed, room.room).work_folder for room in report.rooms]
+        if not any(folder.exists() for folder in in_use):
+            freed += _remove(work_area)
     return freed
 
 

@@ -1,0 +1,135 @@
+"""Rooms on a real Slurm of two virtual nodes, disturbed in every way that a cluster knows, against a local run."""
+
+import json
+import os
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from slurm_cluster import SlurmCluster, missing_programs, slurm_cluster, wait_for
+
+from perpetua.cluster.outcome import ROOM_LOG
+from perpetua.config import load_config
+from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout
+from perpetua.pipeline.stages import STAGE_NAMES
+from perpetua.pipeline.store import output_hashes
+
+pytestmark = [pytest.mark.cluster, pytest.mark.blender, pytest.mark.slow]
+
+SETTINGS = Path(__file__).parents[2] / "benchmarks" / "minimal.yaml"
+SEED, ROOMS = 7, 6
+WHAT = ("--config", str(SETTINGS), "--seed", str(SEED), "--rooms", str(ROOMS))
+SUBMIT = ("submit", *WHAT, "--cpus", "1", "--mem", "4", "--time", "60", "--rooms-per-task", "2", "--device", "cpu")
+# Much more than it takes, for machines with other work.
+PATIENCE_S = 1800
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SlurmCluster]:
+    if missing := missing_programs():
+        reason = f"needs Slurm and Munge (Debian: slurm-wlm munge); these programs are missing: {', '.join(missing)}"
+        if os.environ.get("PERPETUA_TEST_SLURM") == "required":
+            pytest.fail(reason)
+        pytest.skip(reason)
+    with slurm_cluster(tmp_path_factory.mktemp("slurm"), ("n1", "n2")) as started:
+        yield started
+
+
+def _perpetua(*arguments: str, environment: dict[str, str] | None = None) -> str:
+    command = [sys.executable, "-c", "from perpetua.cli import main; main()", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=PATIENCE_S)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def _layout(out: Path, room: int) -> OutputLayout:
+    return OutputLayout(out, load_config("standard", SETTINGS).export, SEED, room)
+
+
+def _jobs(folder: Path) -> list[str]:
+    return sorted((path.stem.removeprefix("submission-") for path in folder.glob("submission-*.json")), key=int)
+
+
+def _events(out: Path, kind: str) -> list[tuple[int, str, int]]:
+    """Room, stage and number of frames done of every event of a kind, from the rooms' logs."""
+    found = []
+    for room in range(ROOMS):
+        log = _layout(out, room).work_folder / ROOM_LOG
+        lines = log.read_text().splitlines() if log.exists() else []
+        events = [json.loads(line) for line in lines if line.endswith("}")]
+        found += [(room, event["stage"], event["frames_done"]) for event in events if event["kind"] == kind]
+    return found
+
+
+def _when(cluster: SlurmCluster, is_so: Callable[[], bool], what: str) -> None:
+    """Waits for something, while tasks that were queued again are let go at once."""
+
+    def looked() -> bool:
+        cluster.start_requeued()
+        return is_so()
+
+    wait_for(looked, PATIENCE_S, what)
+
+
+def test_a_disturbed_cluster_makes_the_bytes_of_a_local_run(cluster: SlurmCluster, tmp_path: Path) -> None:
+    out, local = tmp_path / "cluster", tmp_path / "local"
+    folder = out / WORK_FOLDER / "slurm"
+    submit = (*SUBMIT, "--out", str(out))
+
+    assert "6 to schedule" in _perpetua(*submit, "--dry-run", environment=cluster.environment)
+    assert not out.exists()
+    assert "3 task(s) of up to 2" in _perpetua(*submit, environment=cluster.environment)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    geometry, rest = _jobs(folder)
+    said = _perpetua(*submit, environment=cluster.environment)
+    assert "0 finished, 6 scheduled before, 0 to schedule" in said and _jobs(folder) == [geometry, rest]
+
+    # Queued again by an administrator, in the middle of geometry.
+    _when(cluster, lambda: len(_events(out, "stage_finished")) >= 1, "geometry to begin")
+    name = min(cluster.running(geometry))
+    cluster.run("scontrol", "requeue", name)
+
+    # Out of time while it renders: the signal that Slurm sends before the time is up.
+    _when(cluster, lambda: _events(out, "frame_rendered") != [], "a first frame")
+    room, _, _ = _events(out, "frame_rendered")[-1]
+    stopped = f"{rest}_{room // 2}"
+    cluster.run("scancel", "--signal=USR2", stopped)
+    _when(cluster, lambda: "Requeued job" in (folder / f"{stopped}_0_log.out").read_text(), "its being queued again")
+
+    # A node goes down under its task.
+    _when(cluster, lambda: cluster.running(rest) != {}, "a task of the rest")
+    name, node = min(cluster.running(rest).items())
+    cluster.run("scontrol", "update", f"NodeName={node}", "State=DOWN", "Reason=test")
+    _when(cluster, lambda: cluster.tasks().get(name, ("RUNNING", node))[1] != node, "its leaving the node")
+
+    # Cancelled by mistake.
+    cancelled = max(cluster.tasks())
+    cluster.run("scancel", cancelled)
+    cluster.run("scontrol", "update", f"NodeName={node}", "State=RESUME")
+    _when(cluster, lambda: cluster.tasks() == {}, "all that is queued")
+
+    # The same command schedules what is missing, and that alone.
+    said = _perpetua(*submit, environment=cluster.environment)
+    assert "0 scheduled before, " in said and "6 to schedule" not in said and "0 to schedule" not in said
+    _when(cluster, lambda: cluster.tasks() == {}, "what was missing")
+    said = _perpetua(*submit, environment=cluster.environment)
+    assert "6 finished, 0 scheduled before, 0 to schedule" in said
+
+    status = json.loads(_perpetua("status", "--out", str(out), "--json"))
+    assert [room["state"] for room in status["rooms"]] == ["finished"] * ROOMS
+    # Nothing was made twice: no stage, and no frame, though a task was stopped while it rendered.
+    made_once = {(room, stage, 0): 1 for room in range(ROOMS) for stage in STAGE_NAMES}
+    assert Counter(_events(out, "stage_finished")) == made_once
+    frames = load_config("standard", SETTINGS).sequence.frames
+    rendered = {(room, "render", done + 1): 1 for room in range(ROOMS) for done in range(frames)}
+    assert Counter(_events(out, "frame_rendered")) == rendered
+
+    _perpetua("generate", *WHAT, "--workers", "2", "--device", "cpu", "--out", str(local))
+    for room in range(ROOMS):
+        made, expected = (output_hashes(_layout(where, room).sequence_folder) for where in (out, local))
+        assert len(made) > 10 and made == expected
+    _perpetua("clean", "--out", str(out))
+    assert not (out / WORK_FOLDER).exists()
