@@ -139,7 +139,7 @@ def test_two_dependent_arrays_are_submitted_once(fake_slurm: Path, tmp_path: Pat
 def test_settings_are_not_changed_under_scheduled_tasks(fake_slurm: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     _submit(out, "--rooms", "2")
-    (fake_slurm / "queue").write_text("101_0 RUNNING\n")
+    (fake_slurm / "queue").write_text("101 RUNNING\n")
     assert "was made with other settings" in _submit(out, "--rooms", "2", "--set", "tracks.count=9", code=2)
     said = _submit(out, "--rooms", "2", "--set", "tracks.count=9", "--replace", code=2)
     assert "are scheduled: scancel them" in said
