@@ -34,7 +34,7 @@ from perpetua.files import write_json
 from perpetua.pipeline.codec import load
 from perpetua.rendering.bake import bake_room
 from perpetua.rendering.config import RenderConfig
-from perpetua.rendering.job import PENDING_FILE, RENDER_SCRIPT, write_job
+from perpetua.rendering.job import EXPOSURE_FILE, PENDING_FILE, RENDER_SCRIPT, write_job
 from perpetua.rendering.render import render_views
 from perpetua.rendering.types import RenderedView
 from perpetua.rooms.types import Room
@@ -120,6 +120,8 @@ def watch_worker(scene: Scene, config: RenderConfig, folder: Path, device: str =
     folder.mkdir(parents=True)
     job = write_job(folder, scene.room, scene.actors, scene.cameras, config, device, {})
     write_json(folder / PENDING_FILE, {"frames": list(range(len(scene.cameras[0].world_from_camera)))})
+    if not meter:
+        write_json(folder / EXPOSURE_FILE, {"exposure_ev": 0.0, "gains": [1.0, 1.0, 1.0]})
     pipe = subprocess.PIPE
     command, environment = script_command(RENDER_SCRIPT, job, None), script_environment(folder)
     process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, env=environment)
@@ -178,14 +180,14 @@ def overhead(scene: Scene, config: RenderConfig, given: argparse.Namespace) -> N
 def growth(scene: Scene, config: RenderConfig, given: argparse.Namespace) -> None:
     """CPU seconds against frames and views, each in a process of its own."""
     costs: dict[tuple[int, int], float] = {}
-    for frames, views in ((1, 1), (1, 2), (1, 4), (2, 4), (3, 4)):
+    for frames, views in ((1, 1), (1, 2), (1, 4), (2, 4), (4, 4)):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        watch_worker(scene.cut(frames, views), config, given.scratch / "growth")
+        watch_worker(scene.cut(frames, views), config, given.scratch / "growth", meter=False)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         costs[frames, views] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         print(f"{frames} frames x {views} views: {costs[frames, views]:8.2f} CPU s", flush=True)
-    more_s = costs[3, 4] - costs[2, 4], costs[2, 4] - costs[1, 4]
-    print(f"each further frame of 4 views: {more_s[1]:.2f} and {more_s[0]:.2f} CPU s")
+    print(f"the second frame of 4 views: {costs[2, 4] - costs[1, 4]:.2f} CPU s")
+    print(f"the third and fourth, each: {(costs[4, 4] - costs[2, 4]) / 2:.2f} CPU s")
     print(f"4 views of a frame against one view in its own process: {costs[1, 4] / costs[1, 1]:.2f} times")
 
 
