@@ -114,8 +114,13 @@ class Moment:
     text: str
 
 
-def watch_worker(scene: Scene, config: RenderConfig, folder: Path, device: str = "cpu") -> tuple[list[Moment], float]:
-    """Runs the worker on a whole job: every line it writes, with time stamps, and its peak memory in MB."""
+def watch_worker(
+    scene: Scene, config: RenderConfig, folder: Path, device: str = "cpu", meter: bool = True
+) -> tuple[list[Moment], float]:
+    """Runs the worker on a whole job: every line it writes, with time stamps, and its peak memory in MB.
+
+    ``meter`` False: with an exposure that is given, as metering looks at up to three frames.
+    """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     job = write_job(folder, scene.room, scene.actors, scene.cameras, config, device, {})
