@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from render_costs import STEPS, Costs, measure_costs
-from render_error import Error, measure_errors
+from render_error import BUDGET_PX, REFERENCE_SAMPLES, Error, measure_errors
 from render_look import Crop, compare_crops, render_pair
 from render_scenes import FRAMES, VIEWS, Scene, bake_scene, load_scene, spent_by_children
 
@@ -144,8 +144,12 @@ def _errors(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
     for scene in scenes:
         baked, config = _bake(options, scene)[0], _config(options, 512, 32)
         errors += measure_errors(scene, baked, config, options.crop)
+    width_px = options.width or 512
+    share = width_px**2 / BUDGET_PX
     return [
-        f"# Error at equal time, crops of {options.crop} px",
+        f"# Error at equal time against {REFERENCE_SAMPLES} samples, crops of {options.crop} px of {width_px} px",
+        "",
+        f"Budgets are for 512 x 512 px; these images get {share:.3f} of them, and one sample at least.",
         "",
         _row(["room", "way", "budget, CPU s", "samples", "CPU s of an image", "RMSE"]),
         _row(["---"] * 6),
