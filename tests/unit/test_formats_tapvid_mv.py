@@ -46,7 +46,12 @@ def test_every_file_has_the_type_and_shape_of_the_layout(written: Path) -> None:
             f"{view}/visibility.npy": ("bool", (6, 200)),
             f"{view}/depth.npy": ("float32", (6, 72, 96)),
             f"{view}/foreground_mask.npy": ("bool", (6, 72, 96)),
+            f"{view}/tracks_xy.npy": ("float32", (6, 200, 2)),
         }
+    expected |= {
+        "object_poses.npy": ("float32", (6, 6, 4, 4)),
+        "object_boxes.npy": ("float32", (6, 6, 2, 3)),
+    }
     names = {path.relative_to(written).as_posix() for path in written.rglob("*") if path.is_file()}
     assert names == {*expected, "sequence.json"}
     for name, (dtype, shape) in expected.items():
@@ -86,7 +91,9 @@ def test_record_ties_tracks_to_surfaces_and_hashes_every_file(written: Path) -> 
     assert [kind != "static" for kind in record["tracks"]["class"]] == people
     for name, digest in record["files"].items():
         assert hashlib.sha256((written / name).read_bytes()).hexdigest() == digest
-    assert len(record["files"]) == 3 + 3 * 6
+    assert len(record["files"]) == 5 + 3 * 7
+    actor = [None if index <= 4 else index - 5 for index in record["tracks"]["object_index"]]
+    assert record["tracks"]["actor"] == actor
 
 
 def test_equal_input_gives_equal_bytes(written: Path, tmp_path: Path) -> None:
