@@ -31,7 +31,10 @@ def _no_depth(source: ExportSource) -> str | None:
 def _no_objects(source: ExportSource) -> str | None:
     if source.object_index is not None:
         return None
-    return "the object index is neither in the sequence nor in a work area: it is kept until perpetua clean"
+    return (
+        "the object index is neither in the sequence (generate --set export.outputs=[object_index] writes it) nor in a "
+        "work area, which perpetua clean frees"
+    )
 
 
 PICTURES = {

@@ -144,7 +144,17 @@ def test_the_usual_set_lacks_only_what_the_sequence_lacks(made: tuple[Path, Scen
     code, said = run(str(made[0]), "--out", str(tmp_path / "set"), "--times", "2")
     assert code == 0, said
     assert {path.name for path in (tmp_path / "set").iterdir()} == {"sheet.jpg", "video.mp4", "plan.png", "depth.jpg"}
-    assert "no objects.png: the object index is neither in the sequence nor in a work area" in said
+    assert "no objects.png: the object index is neither in the sequence" in said
+
+
+def test_object_index_of_the_sequences_own_files_is_drawn(made: tuple[Path, Scene], tmp_path: Path) -> None:
+    copy = tmp_path / "sequence"
+    shutil.copytree(made[0], copy)
+    for number, view in enumerate(made[1].views):
+        np.save(copy / str(number) / "object_index.npy", view.object_index)
+    code, said = run(str(copy), "--out", str(tmp_path / "set"), "--only", "objects")
+    assert code == 0, said
+    assert [path.name for path in (tmp_path / "set").iterdir()] == ["objects.png"]
 
 
 def test_only_draws_what_it_names(made: tuple[Path, Scene], tmp_path: Path) -> None:
