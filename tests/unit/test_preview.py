@@ -170,7 +170,7 @@ def test_only_draws_what_it_names(made: tuple[Path, Scene], tmp_path: Path) -> N
         (["SEQUENCE", "--rooms", "2"], "needs one of"),
         (["SEQUENCE", "--out", "sheet.jpg"], "--only sheet"),
         (["SEQUENCE", "--only", "objects"], "perpetua clean"),
-        (["/nowhere"], "tracks_xyz.npy"),
+        (["/nowhere"], "the folder of a sequence is required"),
     ],
 )
 def test_bad_input_says_the_rule(
