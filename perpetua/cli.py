@@ -42,7 +42,8 @@ class PerpetuaGroup(click.Group):
             owners = [name for name, command in self.commands.items() if _has_option(command, error.option_name)]
             if owners:
                 first = error.option_name
-                error.message = f"'{first}' comes after a command, for example: perpetua {owners[0]} {first} ..."
+                said = f"'{first}' comes after a command, for example: perpetua {owners[0]} {first} ..."
+                raise click.NoSuchOption(first, said, ctx=context) from None
             raise
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:

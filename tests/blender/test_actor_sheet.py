@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from perpetua.audit import actor_sheets
 from perpetua.config import load_config
+from perpetua.pictures import actor_sheets
 
 
 @pytest.mark.blender
