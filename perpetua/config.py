@@ -15,8 +15,8 @@ from perpetua.config_base import Section
 from perpetua.errors import ConfigError
 from perpetua.formats.config import ExportConfig
 from perpetua.navigation.config import NavigationConfig
-from perpetua.pipeline.config import RedrawConfig
-from perpetua.rendering.config import RenderConfig
+from perpetua.pipeline.config import RedrawConfig, WorkConfig
+from perpetua.rendering.config import PROCESS_SETTINGS, RenderConfig
 from perpetua.rooms.config import RoomsConfig
 from perpetua.tracks.config import TracksConfig
 
@@ -43,6 +43,11 @@ class Config(Section):
     export: ExportConfig = Field(default_factory=ExportConfig)
     audit: AuditConfig = Field(default_factory=AuditConfig)
     redraw: RedrawConfig = Field(default_factory=RedrawConfig)
+    work: WorkConfig = Field(default_factory=WorkConfig)
+
+    def content(self) -> dict[str, Any]:
+        """The settings that decide what comes out, as JSON values: not how the work is done, or what is kept of it."""
+        return self.model_dump(mode="json", exclude={"work": True, "render": set(PROCESS_SETTINGS)})
 
 
 # From the smallest to the largest.

@@ -5,6 +5,7 @@ import logging
 import shlex
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,7 +20,14 @@ from perpetua.errors import ConfigError, InputError, PerpetuaError
 from perpetua.files import read_json, write_json
 from perpetua.formats.reader import read_sequence
 from perpetua.pictures.contact_sheet import write_contact_sheet
-from perpetua.pipeline.cost import Cost, check_disk, estimate_cost, gigabytes
+from perpetua.pipeline.cost import (
+    TIGHT_SHARE,
+    Cost,
+    check_disk,
+    estimate_cost,
+    gigabytes,
+    require_room_space,
+)
 from perpetua.pipeline.events import OnEvent
 from perpetua.pipeline.free_memory import free_memory_mb
 from perpetua.pipeline.layout import LOG_FILE, OutputLayout, check_writable, open_run
@@ -28,6 +36,7 @@ from perpetua.pipeline.progress import Progress
 from perpetua.pipeline.runner import RoomRun
 from perpetua.pipeline.stages import STAGE_NAMES, STAGES
 from perpetua.pipeline.store import StageFolder
+from perpetua.pipeline.troubles import explained
 from perpetua.rendering.devices import auto_workers
 from perpetua.rooms.build import check_source
 from perpetua.system_libraries import require_libraries
@@ -60,7 +69,7 @@ def run_generate(request: GenerateRequest, console: Console, dry_run: bool) -> i
     """
     say = _speaker(console)
     until = check_request(request)
-    cost = estimate_cost(request.config, len(request.rooms))
+    cost = estimate_cost(request.config, _rooms_to_make(request), max(1, request.workers))
     free_bytes = check_disk(cost, request.out)
     _say_cost(request, cost, free_bytes, until, console)
     if dry_run:
@@ -123,12 +132,15 @@ def exit_code(request: GenerateRequest, failures: dict[int, str]) -> int:
 
 def make_room(request: GenerateRequest, until: str, room: int, on_event: OnEvent) -> None:
     """One room through the stages, and its contact sheet."""
+    if not OutputLayout(request.out, request.config.export, request.seed, room).sequence_folder.exists():
+        require_room_space(estimate_cost(request.config, 1), request.out)
     RoomRun(request.config, request.seed, room, request.out, request.device, on_event).run(until)
     layout = OutputLayout(request.out, request.config.export, request.seed, room)
     if until == STAGES[-1].name and not layout.contact_sheet.exists():
         with hold(layout.work_folder):
             if not layout.contact_sheet.exists():
-                _draw_contact_sheet(layout)
+                with explained("preview", layout.contact_sheet):
+                    _draw_contact_sheet(layout)
 
 
 def room_work(request: GenerateRequest, until: str) -> RoomWork:
@@ -143,7 +155,9 @@ def note_failures(request: GenerateRequest, failures: dict[int, str]) -> None:
         layout = OutputLayout(request.out, request.config.export, request.seed, room)
         if not layout.failure_file.exists():
             failure = {"stage": _first_missing(layout), "reason": reason, "exit_code": PerpetuaError.exit_code}
-            write_json(layout.failure_file, failure)
+            # A full disk has no place for a note; the reason is said all the same.
+            with suppress(OSError):
+                write_json(layout.failure_file, failure)
 
 
 def _first_missing(layout: OutputLayout) -> str:
@@ -163,6 +177,12 @@ def _draw_contact_sheet(layout: OutputLayout) -> None:
     partial_sheet.replace(layout.contact_sheet)
 
 
+def _rooms_to_make(request: GenerateRequest) -> int:
+    """Rooms without a sequence: finished ones need no more disk."""
+    layouts = (OutputLayout(request.out, request.config.export, request.seed, room) for room in request.rooms)
+    return sum(not layout.sequence_folder.exists() for layout in layouts)
+
+
 def _checked_stage(until: str | None) -> str:
     if until is None:
         return STAGE_NAMES[-1]
@@ -176,18 +196,19 @@ def _checked_stage(until: str | None) -> str:
 def _say_cost(request: GenerateRequest, cost: Cost, free_bytes: float, until: str, console: Console) -> None:
     say = _speaker(console)
     render = request.config.render
-    say(f"{cost.rooms} room(s) of seed {request.seed}, first {request.rooms.start}, through stage '{until}'")
+    say(f"{len(request.rooms)} room(s) of seed {request.seed}, first {request.rooms.start}, through stage '{until}'")
     say(
         f"each: {cost.frames} frames x {request.config.cameras.count} views = {cost.images} images of "
         f"{render.width_px} x {render.height_px} px at {render.samples} samples; the time is estimated after the "
         "first frame"
     )
     say(
-        f"disk: about {gigabytes(cost.sequence_bytes)} per sequence and {gigabytes(cost.work_bytes)} of work area, "
-        f"{gigabytes(cost.total_bytes)} in all; {gigabytes(free_bytes)} free"
+        f"disk: about {gigabytes(cost.sequence_bytes)} per sequence, {gigabytes(cost.work_bytes)} of its work is kept, "
+        f"{gigabytes(cost.busy_bytes)} while it is made; {gigabytes(cost.total_bytes)} for {cost.rooms} room(s) that "
+        f"are not there yet; {gigabytes(free_bytes)} free"
     )
-    if free_bytes < cost.total_bytes:
-        say("warning: not all of it fits; run `perpetua clean` as rooms finish, or choose another --out")
+    if cost.total_bytes > TIGHT_SHARE * free_bytes:
+        say("warning: that is tight; --set work.keep=none keeps nothing of the work behind finished sequences")
     say(f"writes to: {request.out.absolute()}")
 
 

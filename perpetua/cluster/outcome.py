@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -81,7 +82,8 @@ class RoomLog:
         self._something_done |= event.kind not in ("room_started", "room_finished")
         # A folder that is not there was freed, and is not made again for a log.
         if self._something_done and self._path.parent.is_dir():
-            with self._path.open("a", encoding="utf-8") as log:
+            # A full disk costs lines of the log, not the room, whose own error says what is wrong.
+            with suppress(OSError), self._path.open("a", encoding="utf-8") as log:
                 log.writelines(self._waiting)
             self._waiting.clear()
 

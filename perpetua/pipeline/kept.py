@@ -16,6 +16,7 @@ from perpetua.pipeline import codec
 from perpetua.pipeline.layout import WORK_FOLDER, RunRecord, read_run
 from perpetua.pipeline.stages import STAGES
 from perpetua.pipeline.store import StageFolder
+from perpetua.pipeline.work_area import SCENE_STAGES
 from perpetua.rendering.types import FilmedScene
 
 
@@ -41,10 +42,11 @@ def load_kept_scene(sequence_folder: Path) -> KeptScene:
     if not work.is_dir():
         raise InputError(
             f"the work area of '{sequence_folder}' is not kept (no {WORK_FOLDER}/{work.name} in its output folder): "
-            "run the same perpetua generate again with a new --out, and no perpetua clean after it"
+            "run the same perpetua generate again with a new --out, work.keep=all, and no perpetua clean after it"
         )
-    scene = FilmedScene(*(_load(work, name) for name in ("room", "motion", "actors", "cameras", "render")))
-    return KeptScene(read_run(work.parent.parent), _room_number(work), _load(work, "routes"), scene)
+    loaded = {name: _load(work, name) for name in SCENE_STAGES}
+    scene = FilmedScene(*(loaded[name] for name in ("room", "motion", "actors", "cameras", "render")))
+    return KeptScene(read_run(work.parent.parent), _room_number(work), loaded["routes"], scene)
 
 
 def kept_object_index(sequence_folder: Path) -> tuple[UInt16[np.ndarray, "T H W"], ...] | None:
@@ -74,8 +76,12 @@ def _holds(work: Path, name: str) -> bool:
 def _load(work: Path, name: str) -> Any:
     stage = next(stage for stage in STAGES if stage.name == name)
     folder = StageFolder(work, stage.number, stage.name)
+    remedy = "run the same perpetua generate again with a new --out"
     if folder.manifest() is None:
-        raise InputError(f"stage '{name}' is missing in '{work}': run the same perpetua generate again")
+        raise InputError(f"stage '{name}' is missing in '{work}': {remedy}")
+    damaged = folder.damage(stage.leftovers)
+    if damaged is not None:
+        raise InputError(f"'{folder.final / damaged}' is not what was written there: {remedy}")
     return codec.load(folder.final)
 
 

@@ -91,7 +91,9 @@ def read_run(out: Path) -> RunRecord:
     except OSError:
         raise InputError(f"'{out}' holds no run of perpetua (no {RUN_FILE}): give the --out of a generate") from None
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"'{path}' cannot be read: {error}") from None
+        raise InputError(
+            f"'{path}' cannot be read ({error}): run the same perpetua generate with --replace, which writes it anew"
+        ) from None
 
 
 def check_writable(out: Path) -> None:
@@ -141,7 +143,7 @@ def _record_rooms(out: Path, seed: int, rooms: range, config: Config, replace: b
 
 def _differences(before: RunRecord, seed: int, config: Config) -> str:
     found = [f"--seed {before.seed}, now {seed}"] if before.seed != seed else []
-    old, new = _flat(before.config.model_dump(mode="json")), _flat(config.model_dump(mode="json"))
+    old, new = _flat(before.config.content()), _flat(config.content())
     found += [f"{key} {old.get(key)}, now {new[key]}" for key in new if old.get(key) != new[key]]
     return "; ".join(found[:4]) + ("; ..." if len(found) > 4 else "")
 

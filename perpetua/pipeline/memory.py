@@ -1,5 +1,7 @@
 """Peak memory of this process and everything it starts."""
 
+import ctypes
+import gc
 import threading
 from types import TracebackType
 
@@ -46,3 +48,12 @@ def tree_memory_mb(root: psutil.Process) -> float:
         except psutil.Error:
             continue
     return total / 1e6
+
+
+def give_back() -> None:
+    """Returns freed memory to the system: the C library keeps what it once had, so a worker would stay as large as its
+    largest room made it."""
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)

@@ -1,7 +1,7 @@
 """What the user sees while rooms are made: a live table on a terminal, plain lines elsewhere, and log.jsonl."""
 
 import time
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -24,7 +24,7 @@ class Progress(AbstractContextManager["Progress"]):
     """
 
     def __init__(self, log_path: Path, rooms: int, images_per_frame: int, console: Console) -> None:
-        self._log = log_path.open("a", encoding="utf-8")
+        self._log_path = log_path
         self._rooms = rooms
         self._images_per_frame = images_per_frame
         self._console = console
@@ -43,12 +43,12 @@ class Progress(AbstractContextManager["Progress"]):
     ) -> None:
         if self._live is not None:
             self._live.__exit__(kind, error, trace)
-        self._log.close()
 
     def show(self, event: Event) -> None:
         """Takes one event."""
-        self._log.write(log_line(event))
-        self._log.flush()
+        # A full disk costs lines of the log, not the run: what failed for it says so itself.
+        with suppress(OSError), self._log_path.open("a", encoding="utf-8") as log:
+            log.write(log_line(event))
         if event.kind == "frame_rendered" and not self._estimated and event.seconds > 0:
             self._estimated = True
             self._console.print(self._estimate(event), highlight=False, markup=False)

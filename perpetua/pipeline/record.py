@@ -49,7 +49,7 @@ def sequence_record(
         "room_height_m": room.height_m,
         "floor_polygon_m": room.floor_polygon_m.tolist(),
         "fps": config.sequence.fps,
-        "config": config.model_dump(mode="json"),
+        "config": config.content(),
         "objects": table,
         "versions": library_versions(),
         "licences": LICENCES,

@@ -2,6 +2,8 @@
 
 import shutil
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -15,8 +17,10 @@ from perpetua.pipeline import codec, store
 from perpetua.pipeline.events import Event, OnEvent
 from perpetua.pipeline.layout import OutputLayout
 from perpetua.pipeline.lease import Lease, hold
-from perpetua.pipeline.memory import PeakMemory
+from perpetua.pipeline.memory import PeakMemory, give_back
 from perpetua.pipeline.stages import SEQUENCE_FOLDER, STAGES, Stage, StageContext
+from perpetua.pipeline.troubles import explained
+from perpetua.pipeline.work_area import free_work
 from perpetua.rendering.scripts import scripts_sha256
 from perpetua.seeding import StageSeed
 
@@ -52,12 +56,17 @@ class RoomRun:
         """
         self._report("room_started")
         if not self._is_published():
-            with hold(self.layout.work_folder) as self.lease:
+            first = self.stages[0].name
+            with explained(first, self.layout.work_folder), hold(self.layout.work_folder) as self.lease:
                 # Another run may have made it since.
                 if not self._is_published():
                     self.layout.failure_file.unlink(missing_ok=True)
                     self._run_draws(until)
         self.layout.failure_file.unlink(missing_ok=True)
+        if until == self.stages[-1].name:
+            free_work(self.layout.work_folder, self.config.work.keep, self.stages)
+        self.values.clear()
+        give_back()
         self._report("room_finished")
 
     def _is_published(self) -> bool:
@@ -88,7 +97,8 @@ class RoomRun:
             if stage.name == until:
                 break
         if until == self.stages[-1].name:
-            self._publish()
+            with explained("publish", self.layout.sequence_folder):
+                self._publish()
         return None
 
     def _reject(self, stage: Stage, error: PerpetuaError) -> None:
@@ -102,7 +112,9 @@ class RoomRun:
 
     def _note_failure(self, stage: Stage, error: PerpetuaError) -> None:
         failure = {"stage": stage.name, "reason": str(error), "exit_code": error.exit_code}
-        write_json(self.layout.failure_file, failure)
+        # On a full disk there is no place for the note either; the error itself is on its way to the user.
+        with suppress(OSError):
+            write_json(self.layout.failure_file, failure)
 
     def _run_stage(self, stage: Stage) -> None:
         folder = store.StageFolder(self.layout.work_folder, stage.number, stage.name)
@@ -112,30 +124,43 @@ class RoomRun:
             return
         self._report("stage_started", stage.name)
         self.lease.require_held()
-        started = time.monotonic()
-        partial = folder.begin(key, stage.resumable)
-        with PeakMemory() as memory:
-            codec.save(stage.run(self._context(stage, partial)), partial)
-            outputs = store.output_hashes(partial, stage.leftovers)
-        self.lease.require_held()
-        seconds = time.monotonic() - started
-        folder.finish(
-            store.Manifest(
-                key=key,
-                stage=stage.name,
-                version=stage.version,
-                seed=self.seed,
-                room=self.room,
-                inputs={name: self.keys[name] for name in stage.needs},
-                outputs=outputs,
-                seconds=round(seconds, 3),
-                peak_memory_mb=round(memory.peak_mb, 1),
-                libraries=store.library_versions(),
-            )
-        )
+        with explained(stage.name, folder.partial), self._undone_on_error(folder, stage):
+            manifest = self._compute(folder, stage)
+            self.lease.require_held()
+            folder.finish(manifest)
         for name in stage.leftovers:
             shutil.rmtree(folder.final / name, ignore_errors=True)
-        self._report("stage_finished", stage.name, seconds=seconds, peak_memory_mb=memory.peak_mb)
+        self._report("stage_finished", stage.name, seconds=manifest.seconds, peak_memory_mb=manifest.peak_memory_mb)
+
+    @contextmanager
+    def _undone_on_error(self, folder: store.StageFolder, stage: Stage) -> Iterator[None]:
+        """Frees what a failed stage left, unless it serves to go on, or another run is at the room by now."""
+        try:
+            yield
+        except Exception:
+            if not stage.resumable and self.lease.is_held:
+                shutil.rmtree(folder.partial, ignore_errors=True)
+            raise
+
+    def _compute(self, folder: store.StageFolder, stage: Stage) -> store.Manifest:
+        key = self.keys[stage.name]
+        started = time.monotonic()
+        with PeakMemory() as memory:
+            partial = folder.begin(key, stage.resumable)
+            codec.save(stage.run(self._context(stage, partial)), partial)
+            outputs = store.output_hashes(partial, stage.leftovers)
+        return store.Manifest(
+            key=key,
+            stage=stage.name,
+            version=stage.version,
+            seed=self.seed,
+            room=self.room,
+            inputs={name: self.keys[name] for name in stage.needs},
+            outputs=outputs,
+            seconds=round(time.monotonic() - started, 3),
+            peak_memory_mb=round(memory.peak_mb, 1),
+            libraries=store.library_versions(),
+        )
 
     def _context(self, stage: Stage, partial: Path) -> StageContext:
         def on_frame(done: int, total: int, seconds: float) -> None:
@@ -174,6 +199,7 @@ class RoomRun:
         write_json(partial / AUDIT_FILE, {**audit, "key": self.keys[last], "rejected_draws": self.rejected})
         # A picture of an earlier sequence of this name must not outlive it.
         self.layout.contact_sheet.unlink(missing_ok=True)
+        store.flush_tree(partial)
         store.replace_folder(partial, target)
         # One room in two splits would leak from training to testing.
         for moved in self.layout.other_sequence_folders:

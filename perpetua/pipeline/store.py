@@ -81,9 +81,7 @@ class StageFolder:
     def is_complete(self, key: str, leftovers: tuple[str, ...] = ()) -> bool:
         """Whether the stage is finished under this key and every output still has its hash."""
         manifest = self.manifest()
-        if manifest is None or manifest.key != key:
-            return False
-        return output_hashes(self.final, leftovers) == manifest.outputs
+        return manifest is not None and manifest.key == key and self.damage(leftovers) is None
 
     def begin(self, key: str, resumable: bool) -> Path:
         """An empty partial folder, or the one an interrupted run left under the same key."""
@@ -94,6 +92,15 @@ class StageFolder:
             self.partial.mkdir(parents=True)
             key_file.write_text(key, encoding="utf-8")
         return self.partial
+
+    def damage(self, leftovers: tuple[str, ...] = ()) -> str | None:
+        """The first file of the finished stage that is not what was written, or None."""
+        manifest = self.manifest()
+        if manifest is None:
+            return MANIFEST_FILE
+        found = output_hashes(self.final, leftovers)
+        changed = {name for name, _ in found.items() ^ manifest.outputs.items()}
+        return min(changed, default=None)
 
     def finish(self, manifest: Manifest) -> None:
         """Writes the manifest and moves the partial folder into place."""
@@ -110,6 +117,16 @@ def replace_folder(source: Path, target: Path) -> None:
         target.rename(old)
     source.rename(target)
     shutil.rmtree(old, ignore_errors=True)
+
+
+def flush_tree(folder: Path) -> None:
+    """Has the disk hold every file below a folder, so that no power failure leaves empty ones behind its new name."""
+    for path in (*folder.rglob("*"), folder):
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def link_tree(source: Path, target: Path) -> None:

@@ -7,6 +7,9 @@ from pydantic import Field, model_validator
 from perpetua.config_base import Section
 from perpetua.rendering.sensor import SensorConfig
 
+# Settings of how the work is done, which do not change what comes out.
+PROCESS_SETTINGS = frozenset({"frame_timeout_s", "max_restarts", "blender", "threads"})
+
 
 class RenderConfig(Section):
     """What Blender is asked for."""

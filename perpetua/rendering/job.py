@@ -18,7 +18,7 @@ from perpetua.actors.types import ActorMesh
 from perpetua.blender import SCRIPT_FOLDER
 from perpetua.cameras.types import CameraPath
 from perpetua.files import file_sha256, write_json
-from perpetua.rendering.config import RenderConfig
+from perpetua.rendering.config import PROCESS_SETTINGS, RenderConfig
 from perpetua.rendering.devices import cpu_threads, machine_share
 from perpetua.rendering.scripts import scripts_sha256
 from perpetua.rendering.sensor import noise_seed, view_gains
@@ -30,8 +30,6 @@ JOB_FILE = "job.json"
 PENDING_FILE = "pending.json"
 EXPOSURE_FILE = "exposure.json"
 FRAME_FOLDER = "frames"
-# Settings of how the work is done, which do not change what comes out.
-PROCESS_SETTINGS = frozenset({"frame_timeout_s", "max_restarts", "blender", "threads"})
 # For pictures that belong to no sequence.
 NO_SEED = StageSeed(0, 0, "render")
 
