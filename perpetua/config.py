@@ -1,6 +1,7 @@
 """The one schema: each stage's section joined; read from YAML, then changed by ``--set a.b=c``."""
 
 import difflib
+import reprlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,13 @@ from perpetua.rooms.config import RoomsConfig
 from perpetua.tracks.config import TracksConfig
 
 PRESET_FOLDER = Path(__file__).parent.parent / "configs"
+
+
+# Thousands of times as much as all settings take.
+MOST_CONFIG_BYTES = 1 << 20
+# Aliases in YAML can stand for more text than fits in memory.
+_brief = reprlib.Repr()
+_brief.maxlevel, _brief.maxstring, _brief.maxother = 2, 120, 120
 
 
 class SequenceConfig(Section):
@@ -96,12 +104,18 @@ def load_config(
 
 def _read_yaml(path: Path) -> dict[str, Any]:
     try:
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"config '{path}' must be a file of YAML, and is no regular file")
+        if path.stat().st_size > MOST_CONFIG_BYTES:
+            raise ConfigError(f"config '{path}' has {path.stat().st_size} bytes; at most {MOST_CONFIG_BYTES} are read")
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"cannot read config '{path}': {error.strerror}") from None
     except UnicodeDecodeError:
         raise ConfigError(f"cannot read config '{path}': it is not a text file in UTF-8") from None
-    except yaml.YAMLError as error:
+    except RecursionError:
+        raise ConfigError(f"config '{path}' is nested too deeply") from None
+    except (yaml.YAMLError, ValueError) as error:
         raise ConfigError(f"config '{path}' is not valid YAML: {_yaml_problem(error)}") from None
     if content is None:
         return {}
@@ -110,7 +124,7 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     return content
 
 
-def _yaml_problem(error: yaml.YAMLError) -> str:
+def _yaml_problem(error: Exception) -> str:
     """Line and problem in one sentence."""
     if not isinstance(error, yaml.MarkedYAMLError) or error.problem_mark is None:
         return str(error)
@@ -126,7 +140,7 @@ def _parse_assignment(assignment: str) -> dict[str, Any]:
         raise ConfigError(f"--set takes KEY=VALUE such as sequence.frames=24, not '{assignment}'")
     try:
         value: Any = yaml.safe_load(text)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ConfigError(f"--set {key}: '{text}' is not valid YAML: {_yaml_problem(error)}") from None
     return _nested(key, value)
 
@@ -192,9 +206,9 @@ def _explain(error: Mapping[str, Any]) -> str:
         return f"unknown config key '{key}'{_nearest(key, table | sections) or '; `perpetua config` lists all'}"
     if error["type"] in ("model_type", "model_attributes_type"):
         first = next(name for name in table if name.startswith(f"{key}."))
-        return f"config key '{key}' is a section, not {error['input']!r}: set what is in it, such as {first}"
+        return f"config key '{key}' is a section, not {_brief.repr(error['input'])}: set what is in it, such as {first}"
     rule = str(error["msg"]).removeprefix("Value error, ").replace("Input should be", "must be")
     rule = _PLAIN_RULES.get(error["type"], rule)
     documented = ".".join(part for part in location if not part.isdigit())
     meaning = table.get(documented, "")
-    return f"config key '{key}' {rule}, not {error['input']!r}" + (f" ({meaning})" if meaning else "")
+    return f"config key '{key}' {rule}, not {_brief.repr(error['input'])}" + (f" ({meaning})" if meaning else "")

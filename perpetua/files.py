@@ -13,10 +13,25 @@ def file_sha256(path: Path) -> str:
         return hashlib.file_digest(handle, "sha256").hexdigest()
 
 
+def load_json(path: Path) -> Any:
+    """The content of a JSON file that anyone may have written.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is no regular file, no JSON, or nested too deeply.
+    """
+    if path.exists() and not path.is_file():
+        raise ValueError("it is no regular file")
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
 def read_json(path: Path) -> dict[str, Any]:
     """The object in a JSON file; empty where there is none that can be read."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = load_json(path)
     except (OSError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}

@@ -1,6 +1,5 @@
 """Finds and loads the files of a sequence, and checks their names, types and shapes. Shares no code with the writer."""
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,9 @@ import numpy as np
 
 from perpetua.audit.report import Check
 from perpetua.errors import SequenceFormatError
+from perpetua.files import load_json
 from perpetua.formats.safe_pickle import read_byte_arrays
+from perpetua.npy import open_npy
 
 # Letters stand for lengths: F frames, E one less, P tracks, K objects, H and W a view's image. The first file that has
 # one settles it.
@@ -121,8 +122,8 @@ def _load(files: SequenceFiles, name: str, rule: tuple[str, tuple[str | int, ...
         faults.append(f"{name} leads out of the folder")
         return
     try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+        array = open_npy(path)
+    except (OSError, ValueError) as error:
         faults.append(f"{name} is missing" if not path.exists() else f"{name} cannot be read: {error}")
         return
     fault = _fault(files, name, array, dtype, shape)
@@ -173,7 +174,7 @@ def _load_record(files: SequenceFiles, faults: list[str]) -> None:
     if not path.exists():
         return
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
+        record = load_json(path)
     except (OSError, ValueError) as error:
         faults.append(f"{RECORD_FILE} cannot be read: {error}")
         return

@@ -1,6 +1,5 @@
 """Reader of the benchmark layout."""
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,8 +9,10 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8, UInt16
 
 from perpetua.errors import SequenceFormatError
+from perpetua.files import load_json
 from perpetua.formats import layout
 from perpetua.formats.safe_pickle import read_byte_arrays
+from perpetua.npy import open_npy
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Sequence:
         if not path.exists():
             return None
         try:
-            content = json.loads(path.read_text(encoding="utf-8"))
+            content = load_json(_inside(self.folder, layout.RECORD))
         except (OSError, ValueError) as error:
             raise SequenceFormatError(f"'{path}' is not valid JSON: {error}") from None
         if not isinstance(content, dict):
@@ -140,10 +141,10 @@ def read_array(
     """
     path = _inside(folder, name)
     try:
-        array = np.load(path, mmap_mode="r" if on_disk else None, allow_pickle=False)
+        array = open_npy(path)
     except FileNotFoundError:
         raise SequenceFormatError(f"'{path}' is missing: the sequence is not whole") from None
-    except (OSError, ValueError, EOFError) as error:
+    except (OSError, ValueError) as error:
         raise SequenceFormatError(f"cannot read '{path}': {error}") from None
     fits = len(array.shape) == len(shape) and all(
         want is None or have == want for have, want in zip(array.shape, shape, strict=True)
@@ -151,7 +152,7 @@ def read_array(
     if array.dtype != dtype or not fits:
         wanted = tuple("any" if length is None else length for length in shape)
         raise SequenceFormatError(f"'{path}' must be {np.dtype(dtype)} {wanted}, not {array.dtype} {array.shape}")
-    return np.asarray(array) if not on_disk else array
+    return array if on_disk else np.array(array)
 
 
 def _inside(folder: Path, name: str) -> Path:

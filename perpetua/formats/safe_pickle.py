@@ -88,6 +88,8 @@ def read_byte_arrays(path: Path) -> tuple[UInt8[np.ndarray, " _"], ...]:
         SequenceFormatError: the file is missing, damaged, or holds anything else.
     """
     try:
+        if path.exists() and not path.is_file():
+            raise ValueError("it is no regular file")
         with path.open("rb") as handle:
             shape = _object_shape(handle)
             content = _ByteArrayUnpickler(handle).load()

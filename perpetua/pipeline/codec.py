@@ -7,6 +7,7 @@ bytes.
 
 import dataclasses
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 from perpetua.actors.types import ActorMesh, ActorPart, BodyMotion, Dwell, Route
 from perpetua.cameras.types import CameraPath
 from perpetua.errors import PerpetuaError
+from perpetua.files import load_json
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.navigation.types import NavGrid
@@ -59,9 +61,8 @@ def load(folder: Path) -> Any:
         DamagedValueError: a file is missing, cut short, or names something outside the folder.
     """
     try:
-        tree = json.loads((folder / VALUE_FILE).read_text(encoding="utf-8"))
-        return _Reader(folder).decode(tree)
-    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+        return _Reader(folder).decode(load_json(folder / VALUE_FILE))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
         raise DamagedValueError(f"cannot read the stage in '{folder}': {error}") from error
 
 

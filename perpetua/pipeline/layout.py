@@ -1,13 +1,12 @@
 """Where a run keeps what: the one place that knows the names below the output folder."""
 
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from perpetua.config import Config
 from perpetua.errors import InputError
-from perpetua.files import write_json
+from perpetua.files import load_json, write_json
 from perpetua.formats.config import ExportConfig, split_of_room
 from perpetua.formats.layout import AUDIT
 from perpetua.pipeline.lease import hold_when_free
@@ -82,7 +81,7 @@ def read_run(out: Path) -> RunRecord:
     """
     path = out / RUN_FILE
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = load_json(path)
         return RunRecord(
             int(content["seed"]),
             tuple(int(room) for room in content["rooms"]),

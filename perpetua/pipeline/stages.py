@@ -30,15 +30,9 @@ from perpetua.navigation.types import NavGrid
 from perpetua.pipeline.config import RedrawConfig
 from perpetua.pipeline.record import sequence_record
 from perpetua.rendering.bake import BAKE_SCRIPT
-<<<<<<< HEAD
-from perpetua.rendering.job import PROCESS_SETTINGS
+from perpetua.rendering.config import PROCESS_SETTINGS
 from perpetua.rendering.render import BAKED_FOLDER, RENDER_SCRIPT, render_views
 from perpetua.rendering.types import FilmedScene, RenderedView
-=======
-from perpetua.rendering.config import PROCESS_SETTINGS
-from perpetua.rendering.render import RENDER_SCRIPT, render_views
-from perpetua.rendering.types import RenderedView
->>>>>>> c04f80b (Full and failing disks and spent memory are said with a remedy; what is kept of the work is a setting, and disk is checked for all rooms)
 from perpetua.rooms.build import build_room
 from perpetua.rooms.scene_file_checks import scene_digests
 from perpetua.rooms.types import Room
@@ -361,13 +355,8 @@ STAGES = (
         90,
         "export",
         3,
-<<<<<<< HEAD
         ("room", "routes", "motion", "actors", "cameras", "render", "tracks"),
-        lambda config: config.model_dump(mode="json"),
-=======
-        ("room", "routes", "actors", "cameras", "render", "tracks"),
         Config.content,
->>>>>>> c04f80b (Full and failing disks and spent memory are said with a remedy; what is kept of the work is a setting, and disk is checked for all rooms)
         _export,
     ),
     Stage(95, "audit", 4, ("actors", "cameras", "tracks", "export"), _settings("audit"), _audit),

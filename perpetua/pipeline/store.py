@@ -12,7 +12,7 @@ import shutil
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from perpetua.files import file_sha256
+from perpetua.files import file_sha256, load_json
 
 MANIFEST_FILE = "manifest.json"
 KEY_FILE = "key"
@@ -73,8 +73,7 @@ class StageFolder:
     def manifest(self) -> Manifest | None:
         """The manifest of the finished stage, or None where there is none that can be read."""
         try:
-            content = json.loads((self.final / MANIFEST_FILE).read_text(encoding="utf-8"))
-            return Manifest(**content)
+            return Manifest(**load_json(self.final / MANIFEST_FILE))
         except (OSError, ValueError, TypeError):
             return None
 
