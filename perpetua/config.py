@@ -151,7 +151,7 @@ def _nested(key: str, value: Any) -> dict[str, Any]:
     return dict(value)
 
 
-def _merge(settings: dict[str, Any], changes: Mapping[str, Any]) -> None:
+def _merge(settings: dict[Any, Any], changes: Mapping[Any, Any]) -> None:
     for key, value in changes.items():
         if isinstance(value, Mapping) and isinstance(settings.get(key), dict):
             _merge(settings[key], value)
@@ -194,6 +194,7 @@ _PLAIN_RULES = {
     "string_type": "must be text",
     "tuple_type": "must be a list such as [a, b]",
     "dict_type": "must be a mapping such as {a: 1}",
+    "invalid_key": "must be the name of a setting",
 }
 
 

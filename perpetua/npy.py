@@ -1,6 +1,7 @@
 """Opens ``.npy`` files that nobody vouches for: nothing in them is run, and nothing is believed about their size."""
 
 import math
+import tokenize
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,9 @@ def open_npy(path: Path) -> np.ndarray:
                 raise ValueError(f"it is of .npy version {version}; (1, 0) or (2, 0) is required")
             shape, fortran_order, dtype = _HEADERS[version](handle)
         # What numpy's parser of headers can say of a forged one.
-        except (SyntaxError, TypeError, KeyError, EOFError, RecursionError, MemoryError, OverflowError) as error:
+        except (
+            SyntaxError, tokenize.TokenError, TypeError, KeyError, EOFError, RecursionError, MemoryError, OverflowError
+        ) as error:  # fmt: skip
             raise ValueError(f"its header is no header of an array: {error}") from None
         start = handle.tell()
     if dtype.kind not in _PLAIN or dtype.hasobject:

@@ -201,12 +201,12 @@ def _tree(folder: Path) -> list[str]:
 def test_bad_sequence_is_refused_and_nothing_happens(tmp_path: Path, case: BadInput) -> None:
     folder = write_sequence(tmp_path / "sequence")
     case.spoil(folder)
-    before, started = _tree(tmp_path), time.monotonic()
+    before, started = _tree(tmp_path), time.process_time()
     with pytest.raises(SequenceFormatError) as caught:
         _ = read_sequence(folder).record
     assert case.says in str(caught.value)
     assert caught.value.exit_code == 2
-    assert time.monotonic() - started < MOST_SECONDS
+    assert time.process_time() - started < MOST_SECONDS
     assert _tree(tmp_path) == before
 
 
