@@ -50,7 +50,10 @@ def test_bad_setting_is_refused(assignment: str, says: str) -> None:
 
 
 def _write(content: bytes) -> Callable[[Path], None]:
-    return lambda path: path.write_bytes(content) and None
+    def spoil(path: Path) -> None:
+        path.write_bytes(content)
+
+    return spoil
 
 
 # Ten aliases of ten aliases of ...: a few hundred bytes that say 10^12 things.
