@@ -132,7 +132,7 @@ def _command(folder: Path) -> None:
 
 TRACKS_FILE = "tracks_xyz.npy"
 BAD_SEQUENCES = (
-    BadInput("file missing", lambda folder: (folder / TRACKS_FILE).unlink(), "No such file"),
+    BadInput("file missing", lambda folder: (folder / TRACKS_FILE).unlink(), "tracks_xyz.npy"),
     BadInput("file empty", _write(TRACKS_FILE, b""), "EOF"),
     BadInput("file cut short", _cut, "does not fit"),
     BadInput("file with a tail", _longer, "does not fit"),
