@@ -23,14 +23,14 @@ what each rule still gets wrong.
 """
 
 import argparse
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
-from pixel_agreement import HEADINGS, PixelCount, count_pixels
+from pixel_agreement import count_pixels
+from visibility_ledger import COUNTED, Ledger, print_rules, print_sequences
 from visibility_sheet import Example, write_sheet
 
 from perpetua.audit.deep import Reach, SceneRays
@@ -47,8 +47,6 @@ CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 BACKGROUND_M = 1e10
 COINCIDENT_M = 0.01
 GRAZING_COSINE = float(np.cos(np.radians(80.0)))
-COUNTED = ("entries", "on image", "wrongly visible", "wrongly hidden", "of these in no pixel")
-GROUPS = ("all", "static", "moving")
 
 
 @dataclass(frozen=True)
@@ -111,51 +109,6 @@ class Subject:
         moving = np.array(table["class"]) != "static"
         numbers = [np.array(table[name], np.int64) for name in ("object_index", "face")]
         return cls(files, scene, numbers[0], numbers[1], moving, hair_faces(scene.actors))
-
-
-class Ledger:
-    """Counts of pixels; of entries by rule and group of tracks; disagreements by kind (on the image), and some examples
-    of each kind."""
-
-    def __init__(self, examples: int) -> None:
-        self.pixels = PixelCount()
-        self.counts: Counter[tuple[str, str, str]] = Counter()
-        self.kinds: Counter[tuple[str, str]] = Counter()
-        self.examples: dict[tuple[str, str], list[Example]] = {}
-        self.wanted = examples
-
-    def enter(self, rule: str, group: str, counted: dict[str, int]) -> None:
-        """Adds counts."""
-        for name, count in counted.items():
-            self.counts[rule, group, name] += count
-
-    def show(self, rule: str, kind: str, example: Example) -> None:
-        """Counts a disagreement, and keeps it as an example while few of its kind are kept, each from another image."""
-        self.kinds[rule, kind] += 1
-        kept = self.examples.setdefault((rule, kind), [])
-        if len(kept) < self.wanted and all(example.image != other.image for other in kept):
-            kept.append(example)
-
-    def add(self, other: "Ledger") -> None:
-        """Takes in what another ledger counted."""
-        self.pixels = self.pixels + other.pixels
-        self.counts.update(other.counts)
-        self.kinds.update(other.kinds)
-        for key, examples in other.examples.items():
-            kept = self.examples.setdefault(key, [])
-            kept += examples[: max(self.wanted - len(kept), 0)]
-
-    def agreement(self, rule: str, group: str = "all") -> list[str]:
-        """Entries and those on the image, agreement of a rule over both, and what is wrong."""
-        counts = {name: self.counts[rule, group, name] for name in COUNTED}
-        wrong = counts["wrongly visible"] + counts["wrongly hidden"]
-        shares = [f"{100 * (1.0 - wrong / max(counts[name], 1)):.3f}%" for name in COUNTED[:2]]
-        numbers = [str(count) for count in counts.values()]
-        return [*numbers[:2], *shares, *numbers[2:]]
-
-    def in_order(self) -> list[tuple[str, str]]:
-        """Rules and kinds that occurred, rule by rule."""
-        return sorted(self.kinds, key=lambda key: (list(RULES).index(key[0]), key[1]))
 
 
 def score(subject: Subject, frames: int, ledger: Ledger) -> None:
@@ -260,10 +213,17 @@ def _kinds(
     normal = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
     towards_m = eye_m - np.asarray(subject.files.arrays["tracks_xyz.npy"][frame], np.float64)[tracks[wrong]]
     size = np.linalg.norm(normal, axis=1) * np.linalg.norm(towards_m, axis=1)
-    grazing = np.abs((normal * towards_m).sum(axis=1)) < GRAZING_COSINE * size
+    facing = (normal * towards_m).sum(axis=1)
+    grazing = np.abs(facing) < GRAZING_COSINE * size
     shown = [(shot.around_object[wrong] == index[:, None]).any(axis=1) for index in (own, theirs)]
-    # Of the rules compared, the stored one alone hides other points; it found other parts of the object in the pixels.
-    of_hidden = {"hair": own_hair, "grazing": grazing, "no pixel around shows its object": ~shown[0]}
+    # Sleeves and hems open to the back of what the stored rule calls closed. What is left lies on rims and edges of
+    # which no pixel's centre shows the point's own side.
+    of_hidden = {
+        "hair": own_hair,
+        "grazing": grazing,
+        "no pixel around shows its object": ~shown[0],
+        "its back is turned to the camera": facing < 0.0,
+    }
     of_visible = {
         "hair": own_hair | their_hair,
         "covered from less than 1 cm": ends.short_m[wrong] < COINCIDENT_M,
@@ -277,36 +237,6 @@ def _kinds(
     return names
 
 
-def _print_row(*cells: str) -> None:
-    print(f"| {' | '.join(cells)} |")
-
-
-def _print_heading(*cells: str) -> None:
-    _print_row(*cells)
-    _print_row(*(["---"] * len(cells)))
-
-
-def _print_sequences(ledgers: dict[str, Ledger]) -> None:
-    """Pixels and the stored visibility, sequence by sequence."""
-    _print_heading("sequence", *HEADINGS, "entries", "visibility", "wrongly visible", "wrongly hidden")
-    for name, ledger in ledgers.items():
-        entries, _, agreement, _, visible, hidden, _ = ledger.agreement("stored")
-        _print_row(name, *ledger.pixels.cells(), entries, agreement, visible, hidden)
-
-
-def _print_rules(ledger: Ledger) -> None:
-    """Rules by groups of tracks, and kinds of disagreement."""
-    print()
-    _print_heading("rule", "tracks", *COUNTED[:2], "agreement", "agreement on image", *COUNTED[2:])
-    for rule in RULES:
-        for group in GROUPS:
-            _print_row(rule, group, *ledger.agreement(rule, group))
-    print()
-    _print_heading("rule", "kind of disagreement", "entries")
-    for rule, kind in ledger.in_order():
-        _print_row(rule, kind, str(ledger.kinds[rule, kind]))
-
-
 def main() -> None:
     """Prints the tables, and draws the sheet."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -316,15 +246,15 @@ def main() -> None:
     parser.add_argument("--sheet", type=Path, help="PNG of examples")
     arguments = parser.parse_args()
     ledgers: dict[str, Ledger] = {}
-    ledger = Ledger(arguments.examples)
+    ledger = Ledger(list(RULES), arguments.examples)
     for folder in (folder for given in arguments.folders for folder in find_sequences(given)):
         subject = Subject.load(folder)
         kind = str((subject.files.record or {}).get("room_kind"))
-        own = ledgers.setdefault(f"{folder.name} ({kind})", Ledger(arguments.examples))
+        own = ledgers.setdefault(f"{folder.name} ({kind})", Ledger(list(RULES), arguments.examples))
         score(subject, arguments.frames, own)
         ledger.add(own)
-    _print_sequences({**ledgers, "all": ledger})
-    _print_rules(ledger)
+    print_sequences({**ledgers, "all": ledger})
+    print_rules(ledger)
     if arguments.sheet is not None:
         rows = {f"{r} ({ledger.kinds[r, kind]})\n{kind}": ledger.examples[r, kind] for r, kind in ledger.in_order()}
         write_sheet(rows, arguments.sheet)

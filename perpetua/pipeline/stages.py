@@ -350,7 +350,7 @@ STAGES = (
         resumable=True,
         leftovers=(RENDER_JOB_FOLDER,),
     ),
-    Stage(80, "tracks", 3, ("room", "actors", "cameras", "render"), _settings("tracks"), _tracks),
+    Stage(80, "tracks", 4, ("room", "actors", "cameras", "render"), _settings("tracks"), _tracks),
     Stage(
         90,
         "export",

@@ -7,8 +7,9 @@ Two witnesses are asked.
   and points on edges and thin things are not lost. Where the object is shown but its surface bends away from that
   plane, the depth of the triangles near the point counts instead: those that the rays of the pixel centres meet
   within two pixels of it.
-- The ray from the camera to the point must meet nothing opaque before it, and the point must not lie on the back of a
-  closed surface.
+- The ray from the camera to the point must meet nothing opaque before it. A point on the back of a closed surface is
+  seen only where the ray meets its own triangle first, as through the opening of a sleeve; elsewhere its front hides
+  it, however thin the thing is.
 
 A point is visible where both say so. Where they differ it is hidden, and counted by the reason (``SightReport``).
 """
@@ -105,7 +106,7 @@ def visible_in_frame(
     cosine = np.abs(height_m) / np.maximum(length_m, 1e-30)
     own = (hits.object_index == points.object_index) & (hits.face == points.face)
     reached = own | (hits.distance_m >= length_m * (1.0 - REACHED_SHARE) - REACHED_M)
-    turned = (height_m <= 0.0) & points.sides.hide_back(around.eye_m)
+    turned = (height_m <= 0.0) & points.sides.hide_back(around.eye_m) & ~own
     reached &= ~turned
     agrees = (shows & _on_plane(points.planes, height_m, around, config)).any(axis=1)
     unsure = np.flatnonzero(reached & ~agrees & shows.any(axis=1))

@@ -115,6 +115,23 @@ def test_backs_of_closed_surfaces_are_hidden_even_when_thin() -> None:
     assert visible(points, corners, seen, sides=around).all(), "a room is seen from inside"
 
 
+def test_the_inside_of_a_sleeve_is_seen_through_its_opening() -> None:
+    """A wall that turns its back to the camera counts as closed, and the ray meets it first."""
+    _, _, seen = slanted_wall(0.0)
+    corner_m = np.array([[-9.0, -9, 3], [9, -9, 3], [0, 18, 3]])
+    weight = np.random.default_rng(4).dirichlet(np.full(3, 20.0), 50)
+    points = weight @ corner_m
+    closed = ClosedSides(np.ones(50, bool), np.zeros((50, 2, 3)))
+    for order in ([0, 1, 2], [0, 2, 1]):
+        sight = SceneSight(SceneMeshes({7: TriMesh(corner_m, np.array([order], np.int32))}, {}, {}))
+        lying = placed(points, np.repeat(corner_m[None, order], 50, axis=0), closed)
+        first = dataclasses.replace(lying, face=np.zeros(50, np.int32))
+        shown, _ = visible_in_frame(first, [seen], sight, HairFaces({}), CONFIG)
+        inside = inside_image(CAMERA, project(CAMERA, points))
+        assert inside.sum() > 20
+        np.testing.assert_array_equal(shown[0], inside)
+
+
 def test_closed_open_and_inverted_surfaces_are_told_apart() -> None:
     ball, bowl, shell = (trimesh.creation.icosphere(subdivisions=2) for _ in range(3))
     bowl.update_faces(bowl.triangles_center[:, 2] < 0.2)
