@@ -8,31 +8,20 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from perpetua.errors import InputError
+from perpetua.npy import ArrayHeader, read_header
 
 MOST_BYTES = 256 * 2**20
 # An .npz file of a data set holds a handful of arrays; a directory of millions is meant to hurt.
 MOST_MEMBERS = 1024
-_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-_PLAIN = "biufcUS"
 
 
 class ArchiveError(InputError):
     """A file is no ``.npz`` archive, or an array in it is not what it may be."""
-
-
-@dataclass(frozen=True)
-class ArrayHeader:
-    """What an array says of itself, found to fit its length."""
-
-    shape: tuple[int, ...]
-    dtype: np.dtype
-    fortran_order: bool
 
 
 class NpzFile:
@@ -66,27 +55,16 @@ class NpzFile:
         """
         with self._reading(name) as handle:
             header = self._read_header(name, handle)
-            count = _count(header)
-            content = handle.read(count * header.dtype.itemsize)
-            if len(content) != count * header.dtype.itemsize or handle.read(1):
-                raise ValueError(f"its data are not the {count} numbers that its header promises")
-            order = "F" if header.fortran_order else "C"
-            return np.frombuffer(content, header.dtype).reshape(header.shape, order=order)  # type: ignore[call-overload]
+            content = handle.read(header.count * header.dtype.itemsize)
+            if len(content) != header.count * header.dtype.itemsize or handle.read(1):
+                raise ValueError(f"its data are not the {header.count} numbers that its header promises")
+            return np.frombuffer(content, header.dtype).reshape(header.shape, order=header.order)  # type: ignore[call-overload]
 
     def _read_header(self, name: str, handle: zipfile.ZipExtFile) -> ArrayHeader:
         size = self._members[name].file_size
         if size > self.most_bytes:
             raise ValueError(f"it unpacks to {size} bytes; at most {self.most_bytes} are read")
-        version = np.lib.format.read_magic(handle)
-        if version not in _HEADERS:
-            raise ValueError(f"it is of .npy version {version}; (1, 0) or (2, 0) is required")
-        shape, fortran_order, dtype = _HEADERS[version](handle)
-        header = ArrayHeader(tuple(int(side) for side in shape), dtype, fortran_order)
-        if dtype.kind not in _PLAIN or dtype.hasobject:
-            raise ValueError(f"it holds {dtype}, and only plain numbers and text are read, never pickled objects")
-        if min(header.shape, default=0) < 0 or size != handle.tell() + _count(header) * dtype.itemsize:
-            raise ValueError(f"its header says {dtype} {header.shape}, which does not fit {size} bytes")
-        return header
+        return read_header(handle, size)
 
     @contextmanager
     def _reading(self, name: str) -> Iterator[zipfile.ZipExtFile]:
@@ -96,16 +74,9 @@ class NpzFile:
         # zipfile says NotImplementedError of a compression it does not know, RuntimeError of an encrypted file.
         except (
             OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError,
-            TypeError, SyntaxError, OverflowError, MemoryError,
+            MemoryError,
         ) as error:  # fmt: skip
             raise ArchiveError(f"'{name}' in '{self.path}' is not a plain array: {error}") from None
-
-
-def _count(header: ArrayHeader) -> int:
-    count = 1
-    for side in header.shape:
-        count *= side
-    return count
 
 
 @contextmanager

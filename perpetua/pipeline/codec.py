@@ -130,7 +130,8 @@ class _Reader:
         small = self.folder / ARRAY_FILE
         self.small: dict[str, np.ndarray] = {}
         if small.exists():
-            with np.load(small, allow_pickle=False) as archive:
+            # Opened here: numpy leaves a file that is no archive open.
+            with small.open("rb") as handle, np.load(handle, allow_pickle=False) as archive:
                 self.small = {key: archive[key] for key in archive.files}
 
     def decode(self, tree: Any) -> Any:

@@ -13,7 +13,7 @@ from perpetua.pipeline import codec
 from perpetua.pipeline.layout import OutputLayout, open_run
 from perpetua.pipeline.record import sequence_record
 from perpetua.pipeline.stages import STAGES
-from perpetua.pipeline.store import Manifest, StageFolder
+from perpetua.pipeline.store import Manifest, StageFolder, output_hashes
 from perpetua.seeding import StageSeed
 
 TRACKS = 60
@@ -34,8 +34,9 @@ def write_run(out: Path, seed: int, room: int = 0) -> Path:
     for stage in STAGES:
         if stage.name in values:
             folder = StageFolder(layout.work_folder, stage.number, stage.name)
-            codec.save(values[stage.name], folder.begin("key", False))
-            folder.finish(Manifest("key", stage.name, 1, seed, room, {}, {}, 0.0, 0.0))
+            partial = folder.begin("key", False)
+            codec.save(values[stage.name], partial)
+            folder.finish(Manifest("key", stage.name, 1, seed, room, {}, output_hashes(partial), 0.0, 0.0))
     record = sequence_record(config, StageSeed(seed, room, "tracks"), scene.room, routes, scene.actors)
     tracks = make_scene_tracks(scene, config.tracks, seed)
     write_sequence(layout.sequence_folder, scene, tracks, record)
