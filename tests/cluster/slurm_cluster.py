@@ -39,7 +39,7 @@ SelectTypeParameters=CR_CPU_Memory
 SchedulerParameters=bf_interval=2,sched_interval=2,batch_sched_delay=0
 KillWait=10
 SlurmdTimeout=30
-ReturnToService=1
+ReturnToService=0
 MaxArraySize=101
 AccountingStorageType=accounting_storage/none
 JobAcctGatherType=jobacct_gather/none
