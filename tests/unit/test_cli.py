@@ -65,7 +65,7 @@ def test_standard_is_the_default_preset(tmp_path: Path) -> None:
         (("generate", "--set", "actors.motion.source=clips"), "actors.motion.clips.folder"),
         (("generate", "--set", "actors.motion.source=kimodo"), "is not a program on this machine"),
         (("generate", "--set", "actors.motion.actions=evryday"), "actors.motion.actions must be one of"),
-        (("generate", "--config", "."), "cannot read config '.': Is a directory"),
+        (("generate", "--config", "."), "must be a file of YAML"),
         (("generate", "--out", "/dev/null/out"), "cannot be a folder, as '/dev/null' is a file"),
         (("generate", "--rooms", "0"), "must be 1 or more, not 0"),
         (("generate", "--rooms", "two"), "must be a whole number, not 'two'"),
