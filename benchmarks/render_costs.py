@@ -10,8 +10,9 @@ from perpetua.files import read_json, write_json
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
 
-# Frames of ours that are rendered: from the difference of two lengths follow a frame's cost and what is paid once.
-SHORT, LONG = 1, 3
+# Frames of ours that are rendered: from the difference of two lengths follow a frame's cost and what is paid once. Both
+# are long enough that exposure is metered at as many frames, which is paid once.
+SHORT, LONG = 3, 5
 STEPS = ("plain loop", "synchronisation", "modifiers", "baking", "sampling")
 
 

@@ -71,6 +71,18 @@ class SlurmCluster:
         tasks = self.tasks().items()
         return {name: node for name, (state, node) in tasks if name.startswith(f"{job}_") and state == "RUNNING"}
 
+    def describe(self, lines: int = 60) -> str:
+        """What is queued and why, how the nodes are, and the ends of the daemons' logs: for who reads a failure."""
+        looks = (
+            ("squeue", "--array", "--format=%i %T %r %N"),
+            ("sinfo", "--Node", "--format=%N %T %E"),
+            ("scontrol", "show", "job"),
+        )
+        said = [self.run(*look) for look in looks]
+        for log in sorted(self.folder.glob("slurm*.log")):
+            said.append("\n".join([log.name, *log.read_text(errors="replace").splitlines()[-lines:]]))
+        return "\n\n".join(said)
+
     def start_requeued(self) -> None:
         """Slurm lets a requeued task wait for two minutes; a test has no use for that."""
         for name, (state, _) in self.tasks().items():

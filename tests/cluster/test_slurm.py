@@ -71,7 +71,10 @@ def _when(cluster: SlurmCluster, is_so: Callable[[], bool], what: str) -> None:
         cluster.start_requeued()
         return is_so()
 
-    wait_for(looked, PATIENCE_S, what)
+    try:
+        wait_for(looked, PATIENCE_S, what)
+    except AssertionError as error:
+        raise AssertionError(f"{error}\n{cluster.describe()}") from None
 
 
 def test_a_disturbed_cluster_makes_the_bytes_of_a_local_run(cluster: SlurmCluster, tmp_path: Path) -> None:
