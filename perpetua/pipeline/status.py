@@ -23,11 +23,13 @@ _MOST_LISTED = 50
 class RoomStatus:
     """How far one room is. ``seconds`` holds the time of each finished stage.
 
+    ``outdated``: its sequence is there, made with other settings or by another version, and ``generate`` replaces it.
     ``worker`` is who works on it, as far as can be told: of another machine also one that just ended without a word.
     """
 
     room: int
     finished: bool
+    outdated: bool
     seconds: dict[str, float]
     failed_stage: str | None
     reason: str | None
@@ -42,7 +44,9 @@ class RoomStatus:
             return "at work"
         if self.failed_stage is not None:
             return "failed"
-        return "started" if self.seconds else "waiting"
+        if self.seconds:
+            return "started"
+        return "outdated" if self.outdated else "waiting"
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,11 @@ class StatusReport:
         """The reasons of failures and the time left, as lines."""
         lines = [f"room {room.room} failed in {room.failed_stage}: {room.reason}" for room in self.rooms if room.reason]
         lines += [f"room {room.room} is at work: {room.worker}" for room in self.rooms if room.worker is not None]
+        if any(room.state == "outdated" for room in self.rooms):
+            lines.append(
+                "outdated: the sequence was made with other settings or by another version of perpetua, and generate "
+                "would replace it; to keep it, generate to another --out"
+            )
         done = sum(room.finished for room in self.rooms)
         left = self.seconds_left
         time_left = "not known yet" if left is None else f"about {left / 60:.1f} min on one worker"
@@ -107,6 +116,7 @@ def _room_status(out: Path, run: RunRecord, room: int) -> RoomStatus:
     return RoomStatus(
         room=room,
         finished=published is not None,
+        outdated=published is None and layout.sequence_folder.is_dir(),
         seconds=seconds,
         failed_stage=failure.get("stage"),
         reason=failure.get("reason"),

@@ -8,9 +8,11 @@ import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+
+import psutil
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "srun", "sbatch", "scontrol", "squeue", "scancel", "sinfo")
 # Debian puts daemons where a user's PATH may not look.
@@ -54,6 +56,7 @@ class SlurmCluster:
 
     folder: Path
     environment: dict[str, str]
+    nodes: dict[str, subprocess.Popen[bytes]]
 
     def run(self, *command: str) -> str:
         """What one of Slurm's commands says."""
@@ -83,6 +86,33 @@ class SlurmCluster:
             said.append("\n".join([log.name, *log.read_text(errors="replace").splitlines()[-lines:]]))
         return "\n\n".join(said)
 
+    def power_off(self, node: str) -> None:
+        """Ends the node's daemon and all that runs on it without a word, as a power failure does."""
+        self.nodes[node].kill()
+        self.nodes[node].wait()
+        for process in psutil.process_iter():
+            with suppress(psutil.Error):
+                environment = process.environ()
+                if environment.get("SLURMD_NODENAME") == node and environment.get("SLURM_CONF") == self._config:
+                    for dying in (*process.parents(), process):
+                        if dying.name() == "slurmstepd" or dying == process:
+                            dying.kill()
+        self.run("scontrol", "update", f"NodeName={node}", "State=DOWN", "Reason=no power")
+
+    def power_on(self, node: str) -> None:
+        """Starts the node's daemon, and gives the node back to the cluster once it answers."""
+        self.start_node(node)
+        wait_for(lambda: "*" not in self.run("sinfo", "--noheader", f"--nodes={node}", "--format=%T"), 120, node)
+        self.run("scontrol", "update", f"NodeName={node}", "State=RESUME")
+
+    def start_node(self, node: str) -> None:
+        """Starts a node's daemon."""
+        self.nodes[node] = _start(self.folder, self.environment, "slurmd", "-D", "-N", node)
+
+    @property
+    def _config(self) -> str:
+        return self.environment["SLURM_CONF"]
+
     def start_requeued(self) -> None:
         """Slurm lets a requeued task wait for two minutes; a test has no use for that."""
         for name, (state, _) in self.tasks().items():
@@ -103,18 +133,20 @@ def slurm_cluster(folder: Path, nodes: tuple[str, ...]) -> Iterator[SlurmCluster
     """Starts a cluster, and ends every process of it."""
     environment = {**os.environ, "PATH": PATH, "SLURM_CONF": str(folder / "slurm.conf")}
     _write_config(folder, nodes)
-    cluster = SlurmCluster(folder, environment)
+    cluster = SlurmCluster(folder, environment, {})
     daemons: list[subprocess.Popen[bytes]] = []
     try:
-        daemons.append(_start(cluster, "munged", "--foreground", "--force", *_munge_options(folder)))
+        daemons.append(_start(folder, environment, "munged", "--foreground", "--force", *_munge_options(folder)))
         wait_for(lambda: (folder / "munge.socket").exists(), 30, "munged")
-        daemons.append(_start(cluster, "slurmctld", "-D"))
-        daemons += [_start(cluster, "slurmd", "-D", "-N", node) for node in nodes]
+        daemons.append(_start(folder, environment, "slurmctld", "-D"))
+        for node in nodes:
+            cluster.start_node(node)
         wait_for(lambda: _idle_nodes(cluster) == len(nodes), 120, "all nodes to be idle")
         yield cluster
     finally:
         # Nodes first, while the controller can still tell them what they run.
         subprocess.run(["scancel", "--me"], env=environment, capture_output=True, check=False, timeout=60)
+        daemons += cluster.nodes.values()
         for daemon in reversed(daemons):
             daemon.send_signal(signal.SIGTERM)
         for daemon in reversed(daemons):
@@ -159,9 +191,9 @@ def _free_ports(count: int) -> list[int]:
     return ports
 
 
-def _start(cluster: SlurmCluster, *command: str) -> subprocess.Popen[bytes]:
-    with (cluster.folder / "daemons.out").open("ab") as log:
-        return subprocess.Popen(command, env=cluster.environment, stdout=log, stderr=log, stdin=subprocess.DEVNULL)
+def _start(folder: Path, environment: dict[str, str], *command: str) -> subprocess.Popen[bytes]:
+    with (folder / "daemons.out").open("ab") as log:
+        return subprocess.Popen(command, env=environment, stdout=log, stderr=log, stdin=subprocess.DEVNULL)
 
 
 def _end(daemon: subprocess.Popen[bytes]) -> None:

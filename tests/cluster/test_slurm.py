@@ -24,7 +24,7 @@ SEED, ROOMS = 7, 6
 WHAT = ("--config", str(SETTINGS), "--seed", str(SEED), "--rooms", str(ROOMS))
 SUBMIT = ("submit", *WHAT, "--cpus", "1", "--mem", "4", "--time", "60", "--rooms-per-task", "2", "--device", "cpu")
 # Much more than it takes, for machines with other work.
-PATIENCE_S = 1800
+PATIENCE_S = 900
 
 
 @pytest.fixture(scope="module")
@@ -102,16 +102,16 @@ def test_a_disturbed_cluster_makes_the_bytes_of_a_local_run(cluster: SlurmCluste
     cluster.run("scancel", "--signal=USR2", stopped)
     _when(cluster, lambda: "Requeued job" in (folder / f"{stopped}_0_log.out").read_text(), "its being queued again")
 
-    # A node goes down under its task.
+    # A node loses its power under its task.
     _when(cluster, lambda: cluster.running(rest) != {}, "a task of the rest")
     name, node = min(cluster.running(rest).items())
-    cluster.run("scontrol", "update", f"NodeName={node}", "State=DOWN", "Reason=test")
+    cluster.power_off(node)
     _when(cluster, lambda: cluster.tasks().get(name, ("RUNNING", node))[1] != node, "its leaving the node")
 
     # Cancelled by mistake.
     cancelled = max(cluster.tasks())
     cluster.run("scancel", cancelled)
-    cluster.run("scontrol", "update", f"NodeName={node}", "State=RESUME")
+    cluster.power_on(node)
     _when(cluster, lambda: cluster.tasks() == {}, "all that is queued")
 
     # The same command schedules what is missing, and that alone.

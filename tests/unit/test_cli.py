@@ -187,6 +187,19 @@ def test_status_of_a_run_that_has_not_begun(tmp_path: Path) -> None:
     assert report["seconds_left"] is None
 
 
+def test_status_of_a_sequence_that_other_settings_or_another_version_made(tmp_path: Path) -> None:
+    from perpetua.config import load_config
+    from perpetua.pipeline.layout import OutputLayout
+
+    (tmp_path / "run.json").write_text(json.dumps({"seed": 7, "rooms": [0, 1], "config": json.loads(_config_json())}))
+    sequence = OutputLayout(tmp_path, load_config("tiny").export, 7, 1).sequence_folder
+    sequence.mkdir(parents=True)
+    (sequence / "audit.json").write_text(json.dumps({"key": "another", "rejected_draws": 0}))
+    report = json.loads(_perpetua("status", "--out", str(tmp_path), "--json").output)
+    assert [room["state"] for room in report["rooms"]] == ["waiting", "outdated"]
+    assert "generate would replace it" in _perpetua("status", "--out", str(tmp_path)).output
+
+
 def test_assets_lists_licences() -> None:
     done = _perpetua("assets")
     assert done.exit_code == 0
