@@ -151,10 +151,20 @@ def _errors(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
         "",
         f"Budgets are for 512 x 512 px; these images get {share:.3f} of them, and one sample at least.",
         "",
-        _row(["room", "way", "budget, CPU s", "samples", "CPU s of an image", "RMSE"]),
-        _row(["---"] * 6),
+        _row(["room", "way", "budget, CPU s", "samples", "CPU s of an image", "times the budget", "RMSE"]),
+        _row(["---"] * 7),
         *(
-            _row([one.room, one.way, f"{one.budget_s:g}", str(one.samples), f"{one.cpu_s:.1f}", f"{one.rmse:.4f}"])
+            _row(
+                [
+                    one.room,
+                    one.way,
+                    f"{one.budget_s:g}",
+                    str(one.samples),
+                    f"{one.cpu_s:.1f}",
+                    f"{one.cpu_s / (share * one.budget_s):.1f}",
+                    f"{one.rmse:.4f}",
+                ]
+            )
             for one in errors
         ),
     ]

@@ -1,4 +1,4 @@
-"""Rooms on a real Slurm of two virtual nodes, disturbed in every way that a cluster knows, against a local run."""
+"""Rooms on a real Slurm of two virtual nodes, disturbed in many ways, against two local runs that share a folder."""
 
 import json
 import os
@@ -38,9 +38,14 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SlurmCluster]:
         yield started
 
 
+def _command(*arguments: str) -> list[str]:
+    return [sys.executable, "-c", "from perpetua.cli import main; main()", *arguments]
+
+
 def _perpetua(*arguments: str, environment: dict[str, str] | None = None) -> str:
-    command = [sys.executable, "-c", "from perpetua.cli import main; main()", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=PATIENCE_S)
+    done = subprocess.run(
+        _command(*arguments), capture_output=True, text=True, check=False, env=environment, timeout=PATIENCE_S
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -77,7 +82,14 @@ def _when(cluster: SlurmCluster, is_so: Callable[[], bool], what: str) -> None:
         raise AssertionError(f"{error}\n{cluster.describe()}") from None
 
 
-def test_a_disturbed_cluster_makes_the_bytes_of_a_local_run(cluster: SlurmCluster, tmp_path: Path) -> None:
+def _assert_nothing_was_made_twice(out: Path) -> None:
+    """Every stage of every room, and every frame, was made, by one process alone."""
+    assert {stage for _, stage, _ in _events(out, "stage_finished")} == set(STAGE_NAMES)
+    for kind in ("stage_finished", "frame_rendered"):
+        assert set(Counter(_events(out, kind)).values()) == {1}
+
+
+def test_a_disturbed_cluster_makes_the_bytes_of_two_local_runs(cluster: SlurmCluster, tmp_path: Path) -> None:
     out, local = tmp_path / "cluster", tmp_path / "local"
     folder = out / WORK_FOLDER / "slurm"
     submit = (*SUBMIT, "--out", str(out))
@@ -123,12 +135,13 @@ def test_a_disturbed_cluster_makes_the_bytes_of_a_local_run(cluster: SlurmCluste
 
     status = json.loads(_perpetua("status", "--out", str(out), "--json"))
     assert [room["state"] for room in status["rooms"]] == ["finished"] * ROOMS
-    # Nothing was made twice: no stage, and no frame, though a task was stopped while it rendered.
-    assert {stage for _, stage, _ in _events(out, "stage_finished")} == set(STAGE_NAMES)
-    for kind in ("stage_finished", "frame_rendered"):
-        assert set(Counter(_events(out, kind)).values()) == {1}
+    # Though a task was stopped while it rendered.
+    _assert_nothing_was_made_twice(out)
 
-    _perpetua("generate", *WHAT, "--workers", "2", "--device", "cpu", "--out", str(local))
+    generate = _command("generate", *WHAT, "--workers", "1", "--device", "cpu", "--out", str(local))
+    runs = [subprocess.Popen(generate, stdout=subprocess.DEVNULL) for _ in range(2)]
+    assert [run.wait(PATIENCE_S) for run in runs] == [0, 0]
+    _assert_nothing_was_made_twice(local)
     for room in range(ROOMS):
         made, expected = (output_hashes(_layout(where, room).sequence_folder) for where in (out, local))
         assert len(made) > 10 and made == expected
