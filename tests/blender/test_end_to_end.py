@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -108,8 +109,19 @@ def _frames_rendered(log: Path) -> list[int]:
     return [line["frames_done"] for line in lines if line["kind"] == "frame_rendered"]
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
-def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(tmp_path: Path, workers: str) -> None:
+@pytest.mark.parametrize(
+    ("workers", "send", "number"),
+    [
+        ("1", os.killpg, signal.SIGINT),
+        ("2", os.killpg, signal.SIGINT),
+        ("2", os.killpg, signal.SIGTERM),
+        ("2", os.kill, signal.SIGTERM),
+    ],
+    ids=["Ctrl-C", "Ctrl-C, workers", "SIGTERM for all processes", "SIGTERM for the command alone"],
+)
+def test_told_to_stop_it_stops_cleanly_and_says_how_to_go_on(
+    tmp_path: Path, workers: str, send: Callable[[int, int], None], number: int
+) -> None:
     arguments = ("generate", "--preset", "tiny", "--rooms", "2", "--workers", workers, "--out", str(tmp_path))
     run = subprocess.Popen(
         _command(*arguments),
@@ -124,7 +136,7 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(tmp_path: Path, workers: str
     while not (log.exists() and '"stage_started"' in log.read_text()):
         assert run.poll() is None and time.monotonic() < deadline
         time.sleep(0.05)
-    os.killpg(run.pid, signal.SIGINT)
+    send(run.pid, number)
     out, err = run.communicate(timeout=60)
     assert run.returncode == 130, out + err
     assert "To go on, run the same command again" in out

@@ -51,7 +51,7 @@ FAULTS = (
         "Ctrl-C, or SIGTERM as a scheduler sends it",
         "exit code 130 at once, no process left, how to go on is said",
         "blender/test_end_to_end.py",
-        "test_ctrl_c_stops_cleanly_and_says_how_to_go_on",
+        "test_told_to_stop_it_stops_cleanly_and_says_how_to_go_on",
     ),
     Fault(
         "disk full in the middle of a stage",
