@@ -54,6 +54,18 @@ FAULTS = (
         "test_told_to_stop_it_stops_cleanly_and_says_how_to_go_on",
     ),
     Fault(
+        "two runs on one folder at once",
+        "each stage and frame is made by one of them; both end with all rooms; the bytes of a run on a cluster",
+        "cluster/test_slurm.py",
+        "test_a_disturbed_cluster_makes_the_bytes_of_two_local_runs",
+    ),
+    Fault(
+        "on a cluster: a task requeued, one out of time, one cancelled, a node that loses its power",
+        "what was lost is made again, nothing else; submit schedules what is missing; the bytes of a local run",
+        "cluster/test_slurm.py",
+        "test_a_disturbed_cluster_makes_the_bytes_of_two_local_runs",
+    ),
+    Fault(
         "disk full in the middle of a stage",
         "DiskError: free space; what the stage left is removed; the same command goes on",
         "unit/test_faults_machine.py",
