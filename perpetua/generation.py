@@ -92,10 +92,19 @@ def check_request(request: GenerateRequest) -> str:
     """
     until = _checked_stage(request.until)
     require_libraries()
+    check_inputs(request)
+    return until
+
+
+def check_inputs(request: GenerateRequest) -> None:
+    """Passes what the user names, on a machine that need not be one that does the work.
+
+    Raises:
+        InputError: a file, a folder or a name is missing or wrong.
+    """
     check_source(request.config.rooms)
     check_people(request.config.actors)
     check_writable(request.out)
-    return until
 
 
 def make_rooms(request: GenerateRequest, until: str, console: Console) -> dict[int, str]:

@@ -10,12 +10,11 @@ from perpetua.cluster import slurm
 from perpetua.cluster.plan import LAST_OF_GEOMETRY, Plan, Resources, make_plan
 from perpetua.cluster.task import RoomsTask
 from perpetua.errors import InputError
-from perpetua.generation import GenerateRequest
+from perpetua.generation import GenerateRequest, check_inputs
 from perpetua.pipeline.cost import estimate_cost, gigabytes
 from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout, RunRecord, open_run
 from perpetua.pipeline.lease import hold_when_free
 from perpetua.pipeline.stages import STAGES
-from perpetua.rooms.build import check_source
 
 SLURM_FOLDER = "slurm"
 
@@ -39,7 +38,7 @@ def run_submit(request: SubmitRequest, console: Console, dry_run: bool) -> None:
     """
     say = partial(console.print, highlight=False, markup=False, soft_wrap=True)
     generate = request.generate
-    check_source(generate.config.rooms)
+    check_inputs(generate)
     if dry_run:
         for line in _describe(request, _plan(request)):
             say(line)

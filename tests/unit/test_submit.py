@@ -151,6 +151,14 @@ def test_refusals_of_slurm_are_told(fake_slurm: Path, tmp_path: Path) -> None:
     assert "Slurm did not take the tasks" in said and "invalid partition" in said
 
 
+def test_a_missing_input_is_told_before_anything_is_scheduled(fake_slurm: Path, tmp_path: Path) -> None:
+    wrong = ("--set", "actors.clothing.source=makehuman", "--set", f"actors.clothing.folder={tmp_path / 'none'}")
+    assert "none" in _submit(tmp_path / "out", *wrong, code=2)
+    (tmp_path / "file").touch()
+    assert "file" in _submit(tmp_path / "file", code=2)
+    assert (fake_slurm / "last").read_text() == "100" and not (tmp_path / "out").exists()
+
+
 def test_tasks_run_nothing_that_others_may_have_stored(tmp_path: Path) -> None:
     folder = tmp_path / "slurm"
     slurm.open_folder(folder)
