@@ -23,7 +23,8 @@ import numpy as np
 from bake_work import Work, collect
 from baked_images import ImageFiles, refer_relatively
 from baked_materials import BAKED_UV, build_baked_material
-from shader_channels import COLOR, GLOSS, NORMAL, SURFACE, ChannelReader, constant_gloss
+from shader_channels import COLOR, GLOSS, NORMAL, SURFACE, ChannelReader
+from shader_constants import Constants, read_constants
 from worker_link import Worker, read_job
 
 MARGIN_PX = 3
@@ -42,7 +43,7 @@ class Baker:
         self._reader = ChannelReader()
         self._rewired: dict[str, dict[str, bpy.types.Node]] = {}
         self._bumps = bumps()
-        self._gloss: dict[str, tuple[float, ...] | None] = {}
+        self._constants: dict[str, Constants] = {}
         self._blank = bpy.data.materials.new("blank")
         self._blank.use_nodes = True
 
@@ -61,16 +62,16 @@ class Baker:
         for slot, original in enumerate(originals):
             mesh.materials[slot] = original
             if slot in work.slots:
-                mesh.materials[slot] = build_baked_material(mesh.name, images, self._gloss[original.name_full])
+                mesh.materials[slot] = build_baked_material(mesh.name, images, self._constants[original.name_full])
         return packing.width_px * packing.height_px, len(missing)
 
     def _channels(self, materials: list[bpy.types.Material]) -> list[str]:
         """What differs from place to place on a mesh with these materials."""
         for material in materials:
-            if material.name_full not in self._gloss:
-                self._gloss[material.name_full] = constant_gloss(material.node_tree)
+            if material.name_full not in self._constants:
+                self._constants[material.name_full] = read_constants(material)
         channels = [COLOR, SURFACE]
-        if any(self._gloss[material.name_full] is None for material in materials):
+        if any(self._constants[material.name_full].gloss is None for material in materials):
             channels.append(GLOSS)
         if any(material.name_full in self._bumps for material in materials):
             channels.append(NORMAL)

@@ -4,15 +4,14 @@
 import bpy
 import numpy as np
 from shader_channels import COLOR, DEFAULT, GLOSS, GLOSS_INPUTS, NORMAL, SURFACE
+from shader_constants import Constants
 
 BAKED_UV = "baked"
 # Less translucency than this is not worth a second shader.
 MIN_TRANSLUCENCY = 0.02
 
 
-def build_baked_material(
-    name: str, images: dict[str, bpy.types.Image], gloss: tuple[float, ...] | None
-) -> bpy.types.Material:
+def build_baked_material(name: str, images: dict[str, bpy.types.Image], constants: Constants) -> bpy.types.Material:
     """A material of the images of COLOR, SURFACE and, if there are bumps, NORMAL; GLOSS is an image or constant."""
     material = bpy.data.materials.new(f"{name}_baked")
     material.use_nodes = True
@@ -27,8 +26,10 @@ def build_baked_material(
     tree.links.new(color, shader.inputs["Base Color"])
     tree.links.new(surface.outputs[0], shader.inputs["Roughness"])
     tree.links.new(surface.outputs[1], shader.inputs["Metallic"])
-    for socket, value in zip(GLOSS_INPUTS, DEFAULT[GLOSS] if gloss is None else gloss, strict=True):
+    for socket, value in zip(GLOSS_INPUTS, constants.gloss or DEFAULT[GLOSS], strict=True):
         shader.inputs[socket].default_value = value
+    for socket, kept in constants.kept.items():
+        shader.inputs[socket].default_value = kept if len(kept) > 1 else kept[0]
     if GLOSS in images:
         parts = tree.nodes.new("ShaderNodeSeparateXYZ")
         tree.links.new(_image(tree, uv, images[GLOSS]), parts.inputs[0])

@@ -126,7 +126,7 @@ def _bsdf_surface(tree: Tree, node: bpy.types.Node) -> Socket:
 
 def _bsdf_gloss(tree: Tree, node: bpy.types.Node) -> Socket:
     combine = tree.nodes.new("ShaderNodeCombineXYZ")
-    for name, target, value in zip(GLOSS_INPUTS, combine.inputs, _plain_gloss(node), strict=True):
+    for name, target, value in zip(GLOSS_INPUTS, combine.inputs, plain_gloss(node), strict=True):
         if name in node.inputs:
             _copy(tree, node.inputs[name], target)
         else:
@@ -134,23 +134,9 @@ def _bsdf_gloss(tree: Tree, node: bpy.types.Node) -> Socket:
     return combine.outputs[0]
 
 
-def _plain_gloss(node: bpy.types.Node) -> tuple[float, ...]:
+def plain_gloss(node: bpy.types.Node) -> tuple[float, ...]:
     """The GLOSS of a shader that has no inputs for it."""
     return (0.0, 0.0, 0.0) if node.type in MATT else DEFAULT[GLOSS]
-
-
-def constant_gloss(tree: Tree) -> tuple[float, ...] | None:
-    """The GLOSS that all shaders of a tree have in common, or None where it differs or is textured."""
-    found = set()
-    for node in all_nodes(tree):
-        if not node.type.startswith("BSDF"):
-            continue
-        sockets = [node.inputs[name] for name in GLOSS_INPUTS if name in node.inputs]
-        if any(socket.is_linked for socket in sockets):
-            return None
-        values = tuple(round(socket.default_value, 4) for socket in sockets)
-        found.add(values if len(values) == len(GLOSS_INPUTS) else _plain_gloss(node))
-    return found.pop() if len(found) == 1 else None
 
 
 def _copy(tree: Tree, source: Socket, target: Socket) -> None:
