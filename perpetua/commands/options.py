@@ -43,6 +43,18 @@ def _settings() -> dict[str, str]:
     return {f"{key}=": meaning for key, meaning in field_table().items()}
 
 
+SEED_OPTION = click.option(
+    "--seed", type=WholeNumber(0), default=0, show_default=True, help="Decides everything drawn."
+)
+ROOMS_OPTION = click.option(
+    "--rooms", type=WholeNumber(1), default=1, show_default=True, help="How many sequences to make."
+)
+START_ROOM_OPTION = click.option(
+    "--start-room", type=WholeNumber(0), default=0, show_default=True, help="Index of the first room."
+)
+REPLACE_OPTION = click.option(
+    "--replace", is_flag=True, help="Allow other settings than the ones the output folder was made with."
+)
 OUT_OPTION = click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True,
     help="Output folder.",

@@ -12,7 +12,11 @@ from perpetua.commands.options import (
     DEVICE_OPTION,
     OUT_OPTION,
     PRESET_OPTION,
+    REPLACE_OPTION,
+    ROOMS_OPTION,
+    SEED_OPTION,
     SET_OPTION,
+    START_ROOM_OPTION,
     WholeNumber,
     WorkerCount,
     wide_console,
@@ -28,9 +32,9 @@ def _complete_stages(context: click.Context, parameter: click.Parameter, typed: 
 
 
 @click.command(short_help="Make sequences: rooms, people, cameras, video, tracks.")
-@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Decides everything drawn.")
-@click.option("--rooms", type=WholeNumber(1), default=1, show_default=True, help="How many sequences to make.")
-@click.option("--start-room", type=WholeNumber(0), default=0, show_default=True, help="Index of the first room.")
+@SEED_OPTION
+@ROOMS_OPTION
+@START_ROOM_OPTION
 @OUT_OPTION
 @PRESET_OPTION
 @CONFIG_OPTION
@@ -40,7 +44,7 @@ def _complete_stages(context: click.Context, parameter: click.Parameter, typed: 
 @click.option("--workers", type=WorkerCount(), default=1, show_default=True,
               help="Rooms made at a time; auto: one per GPU, or per four cores, as memory allows.")  # fmt: skip
 @DEVICE_OPTION
-@click.option("--replace", is_flag=True, help="Allow other settings than the ones the output folder was made with.")
+@REPLACE_OPTION
 @click.option("--dry-run", is_flag=True, help="Check everything, say what it takes, and do nothing.")
 def generate(
     seed: int,
@@ -79,9 +83,9 @@ def generate(
 
 
 @click.command(short_help="Make sequences on a Slurm cluster.")
-@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Decides everything drawn.")
-@click.option("--rooms", type=WholeNumber(1), default=1, show_default=True, help="How many sequences to make.")
-@click.option("--start-room", type=WholeNumber(0), default=0, show_default=True, help="Index of the first room.")
+@SEED_OPTION
+@ROOMS_OPTION
+@START_ROOM_OPTION
 @OUT_OPTION
 @PRESET_OPTION
 @CONFIG_OPTION
@@ -101,7 +105,7 @@ def generate(
 @click.option("--python", help="What starts Python on a node, for example 'apptainer exec --nv perpetua.sif python3'.")
 @click.option("--sbatch", "sbatch", metavar="OPTION=VALUE", multiple=True,
               help="A further option of sbatch, for example account=vision. Can be given several times.")  # fmt: skip
-@click.option("--replace", is_flag=True, help="Allow other settings than the ones the output folder was made with.")
+@REPLACE_OPTION
 @click.option("--dry-run", is_flag=True, help="Say what would be scheduled, and schedule nothing.")
 def submit(
     seed: int,
