@@ -84,9 +84,10 @@ def load_scene(work: Path, config: RenderConfig, blend: Path | None, scratch: Pa
     room, actors, cameras = (load(work / name) for name in ("10_room", "50_actors", "60_cameras"))
     if blend is not None:
         room = replace(room, blend_path=blend)
-    elif room.blend_path is not None:
-        room = replace(room, blend_path=bake_room(room, config, 4 * SEQUENCE_FRAMES, scratch))
-    return Scene(room, actors, tuple(_resized(camera, config.width_px) for camera in cameras))
+    cameras = tuple(_resized(camera, config.width_px) for camera in cameras)
+    if blend is None and room.blend_path is not None:
+        room = replace(room, blend_path=bake_room(room, cameras, config, 4 * SEQUENCE_FRAMES, scratch))
+    return Scene(room, actors, cameras)
 
 
 def _resized(camera: CameraPath, width_px: int) -> CameraPath:
