@@ -36,7 +36,9 @@ def build_baked_material(name: str, images: dict[str, bpy.types.Image], constant
         for socket, value in zip(GLOSS_INPUTS, parts.outputs, strict=True):
             tree.links.new(value, shader.inputs[socket])
     if NORMAL in images:
-        tree.links.new(_normal(tree, uv, images[NORMAL]), shader.inputs["Normal"])
+        normal = _normal(tree, uv, images[NORMAL])
+        for socket in ("Normal", "Coat Normal"):
+            tree.links.new(normal, shader.inputs[socket])
     result = shader.outputs[0]
     if _brightest(images[SURFACE], 2) > MIN_TRANSLUCENCY:
         result = _translucent(tree, color, surface.outputs[2], result)

@@ -107,12 +107,18 @@ def _gloss(node: bpy.types.Node, path: Path) -> Value | None:
 
 
 def _kept(shaders: list[tuple[bpy.types.Node, Path]]) -> dict[str, Value]:
-    """Of several Principled BSDFs the first counts: a baked material has but one."""
+    """Of several Principled BSDFs the first that has such a layer counts: a baked material is but one."""
     kept: dict[str, Value] = {}
     for node, path in shaders:
         if node.type == "BSDF_PRINCIPLED":
             for name in KEPT_INPUTS:
                 value = _value(node.inputs[name], path)
-                if value is not None:
+                if value is not None and _has_layer(node, path, name):
                     kept.setdefault(name, value)
     return kept
+
+
+def _has_layer(node: bpy.types.Node, path: Path, name: str) -> bool:
+    """Whether the layer that an input describes, coat or sheen, is there; all else is."""
+    weight = node.inputs.get(f"{name.split()[0]} Weight")
+    return weight is None or _value(weight, path) != (0.0,)

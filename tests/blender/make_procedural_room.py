@@ -9,18 +9,18 @@ import sys
 import bpy
 
 RED, BLUE, GREEN = (0.7, 0.05, 0.05, 1.0), (0.05, 0.1, 0.7, 1.0), (0.05, 0.6, 0.05, 1.0)
-SHEEN = {"Sheen Weight": 0.8, "Sheen Roughness": 0.03}
+LAYERS = {"Sheen Weight": 0.8, "Sheen Roughness": 0.03, "Coat Weight": 1.0, "Coat Roughness": 0.7}
 
 
 def checks_group() -> bpy.types.NodeTree:
     """A group that hands out a shader: half diffuse, half principled, both with the checks' colour.
 
-    Its sheen, which only shows at the rim, is one of the group's inputs.
+    Its sheen, which only shows at the rim, and a dull coat come from the group's inputs.
     """
     group = bpy.data.node_groups.new("checks", "ShaderNodeTree")
     group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
     group.interface.new_socket("Extra", in_out="INPUT", socket_type="NodeSocketShader")
-    for name, value in SHEEN.items():
+    for name, value in LAYERS.items():
         group.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat").default_value = value
     start, end = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
     place, checker = group.nodes.new("ShaderNodeTexCoord"), group.nodes.new("ShaderNodeTexChecker")
@@ -32,7 +32,7 @@ def checks_group() -> bpy.types.NodeTree:
     group.links.new(shift.outputs[0], checker.inputs["Vector"])
     principled, mix = group.nodes.new("ShaderNodeBsdfPrincipled"), group.nodes.new("ShaderNodeMixShader")
     principled.inputs["Roughness"].default_value = 0.9
-    for name in SHEEN:
+    for name in LAYERS:
         group.links.new(start.outputs[name], principled.inputs[name])
     group.links.new(checker.outputs["Color"], principled.inputs["Base Color"])
     group.links.new(start.outputs["Extra"], mix.inputs[1])
