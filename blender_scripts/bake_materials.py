@@ -31,8 +31,8 @@ MARGIN_PX = 3
 # Points of a texel that are evaluated and averaged: a joint between boards that is finer than a texel would otherwise
 # be there or not by chance.
 SAMPLES = {COLOR: 6, SURFACE: 2, GLOSS: 1, NORMAL: 2}
-# Only colours need every texel; the others have half as many along each side.
-COARSER = {COLOR: 1, SURFACE: 2, GLOSS: 2, NORMAL: 2}
+# Colours and bumps need every texel; the others have half as many along each side.
+COARSER = {COLOR: 1, SURFACE: 2, GLOSS: 2, NORMAL: 1}
 
 
 class Baker:

@@ -55,7 +55,7 @@ class RenderConfig(Section):
         8_000_000,
         ge=10_000,
         le=100_000_000,
-        description="most texels of a room's baked colours; each takes 8 bytes, with all else",
+        description="most texels of a room's baked colours; each takes 14 bytes, with all else",
     )
     frame_timeout_s: float = Field(1800.0, ge=5.0, description="longest time without progress, seconds")
     max_restarts: int = Field(
