@@ -3,8 +3,8 @@
 ``python benchmarks/many_rooms.py --rooms 200 --workers 1 2 --out DIR``
 
 The memory of the run's own process and of its workers (without the Blender processes that they start) is sampled
-while rooms are made. ``DIR/many_rooms.md`` holds the table: one line
-for each tenth of the rooms, with the mean seconds of a room in it.
+while rooms are made. ``DIR/many_rooms.md`` holds the table: one line for each tenth of the rooms, with the mean
+seconds of a room in it. Rooms differ, so a line fitted to all of them says whether they become slower.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 
+import numpy as np
 import psutil
 
 from perpetua.pipeline.layout import LOG_FILE
@@ -103,6 +104,10 @@ def _table(out: Path, samples: list[Sample]) -> str:
         rooms = f"{first} to {first + len(part) - 1}"
         lines.append(f"| {rooms} | {seconds:.2f} | {clock_s:.2f} | {parent_mb:.0f} | {worker_mb:.0f} |")
         begin = end
+    slope_s, first_s = np.polyfit(range(len(finished)), [when - started[room] for when, room in finished], 1)
+    last_s = first_s + slope_s * (len(finished) - 1)
+    change = f"{100 * (last_s / first_s - 1):+.1f}%"
+    lines += ["", f"Fitted line: {first_s:.2f} s for the first room, {last_s:.2f} s for the last ({change})."]
     return "\n".join(lines) + "\n"
 
 
