@@ -64,7 +64,7 @@ def _run(options: argparse.Namespace, workers: int, out: Path) -> list[Sample]:
         while run.poll() is None:
             samples.append(_sample(run.pid))
             time.sleep(SAMPLE_EVERY_S)
-    if run.returncode != 0:
+    if run.returncode not in (0, 1):
         sys.exit(f"the run ended with exit code {run.returncode}: see {options.out / f'workers_{workers}.log'}")
     return samples
 
@@ -93,6 +93,7 @@ def _table(out: Path, samples: list[Sample]) -> str:
     ]
     size = max(1, len(finished) // PARTS)
     begin = min(started.values())
+    failed = len(started) - len(finished)
     for first in range(0, len(finished), size):
         part = finished[first : first + size]
         end = part[-1][0]
@@ -108,6 +109,7 @@ def _table(out: Path, samples: list[Sample]) -> str:
     last_s = first_s + slope_s * (len(finished) - 1)
     change = f"{100 * (last_s / first_s - 1):+.1f}%"
     lines += ["", f"Fitted line: {first_s:.2f} s for the first room, {last_s:.2f} s for the last ({change})."]
+    lines += [f"Failed: {failed} of {len(started)}."]
     return "\n".join(lines) + "\n"
 
 

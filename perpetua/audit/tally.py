@@ -17,6 +17,14 @@ def chosen_frames(count: int) -> list[int]:
     return chosen
 
 
+def few_enough(failed: int, tested: int, least: float) -> bool:
+    """Whether the share of entries that keep a rule is at least ``least``.
+
+    Where some may fail, one alone proves nothing: of 46 entries one is 2%, and says no more than one of 460.
+    """
+    return failed <= (1.0 - least) * tested + 1e-9 or (least < 1.0 and failed <= 1)
+
+
 @dataclass
 class Tally:
     """Entries of one rule; ``words`` say what the rule is."""
@@ -44,7 +52,7 @@ class Tally:
     @property
     def fault(self) -> str:
         """What is wrong; empty where enough entries keep the rule."""
-        if self.share >= self.least:
+        if few_enough(self.failed, self.tested, self.least):
             return ""
         return f"{self.first} {self.words} ({self.failed} of {self.tested} entries)"
 

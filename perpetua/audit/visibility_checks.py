@@ -9,6 +9,7 @@ from perpetua.audit.config import AuditConfig
 from perpetua.audit.files import SequenceFiles
 from perpetua.audit.geometry import camera_centre_m, depth_of_planes, project_to_pixels
 from perpetua.audit.report import Check
+from perpetua.audit.tally import few_enough
 
 # A hidden point counts as unexplained only where depth shows its surface beyond doubt.
 SHARP = 0.1
@@ -146,6 +147,6 @@ def _depth_words(shown: _Evidence, tracks: np.ndarray, agrees: np.ndarray) -> st
 
 def _bounded(name: str, tally: _Tally, least: float) -> Check:
     share = 1.0 - tally.share
-    passed = share >= least
+    passed = few_enough(tally.failed, tally.tested, least)
     detail = "" if passed else f"{tally.failed} of {tally.tested} entries fail, first {tally.first}"
     return Check(name, passed, share, f">= {least:g} of entries", detail)
