@@ -134,6 +134,7 @@ def test_same_size_changes_no_pixel() -> None:
     np.testing.assert_array_equal(resize.nearest(picture[..., 0]), picture[..., 0])
 
 
+@pytest.mark.filterwarnings("ignore:This DataLoader will create:UserWarning")
 def test_workers_give_the_same_batches(made: tuple[Path, Scene, Sequence]) -> None:
     clips = SequenceDataset([made[0]], views=(1,), clip_frames=2, size_px=(32, 24))
     batches = list(DataLoader(clips, batch_size=3, num_workers=2))
