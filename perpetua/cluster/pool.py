@@ -11,7 +11,8 @@ import signal
 import sys
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -201,10 +202,21 @@ def _start_worker(work: RoomWork, place: int, size: int) -> Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_work_until_closed, args=(theirs, work, os.getpid(), place, size), daemon=True)
-    process.start()
+    with _interrupts_held_back():
+        process.start()
     # Ours alone is open now, so that a worker's end is seen as the end of what it says.
     theirs.close()
     return Worker(process, ours, place)
+
+
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """A process that is started meanwhile does not hear Ctrl-C before it ignores it; this one hears it afterwards."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _work_until_closed(connection: Connection, work: RoomWork, parent: int, place: int, size: int) -> None:
@@ -212,6 +224,7 @@ def _work_until_closed(connection: Connection, work: RoomWork, parent: int, plac
     share_machine(place, size)
     logging.getLogger("perpetua").setLevel(logging.INFO)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     _die_with(parent)
     while True:

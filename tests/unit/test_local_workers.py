@@ -153,6 +153,24 @@ def test_two_runs_on_one_folder_share_the_rooms(tmp_path: Path, rooms: int) -> N
     assert Counter(len(processes) for processes in computed.values()) == {1: rooms}
 
 
+def test_ctrl_c_does_not_hit_a_worker_that_is_being_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    start_worker = pool._start_worker
+
+    def start_and_interrupt(work: RoomWork, place: int, size: int) -> pool.Worker:
+        worker = start_worker(work, place, size)
+        assert worker.process.pid is not None
+        os.kill(worker.process.pid, signal.SIGINT)
+        return worker
+
+    monkeypatch.setattr(pool, "_start_worker", start_and_interrupt)
+    assert run_rooms(range(2), 2, _work(tmp_path), lambda event: None) == {}
+    assert sorted(_computed(tmp_path)) == [0, 1]
+    assert {len(processes) for processes in _computed(tmp_path).values()} == {1}
+    assert capfd.readouterr().err == ""
+
+
 def test_a_room_of_a_run_that_was_killed_is_taken_over(tmp_path: Path) -> None:
     """The killed run's workers die with it, and their leases are seen to be over."""
     context = multiprocessing.get_context("spawn")
