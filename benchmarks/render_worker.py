@@ -82,11 +82,11 @@ def main() -> None:
 def load_scene(work: Path, config: RenderConfig, blend: Path | None, scratch: Path) -> Scene:
     """The room, baked, with actors and with cameras for square images of the config's width."""
     room, actors, cameras = (load(work / name) for name in ("10_room", "50_actors", "60_cameras"))
-    if blend is not None:
-        room = replace(room, blend_path=blend)
     cameras = tuple(_resized(camera, config.width_px) for camera in cameras)
     if blend is None and room.blend_path is not None:
-        room = replace(room, blend_path=bake_room(room, cameras, config, 4 * SEQUENCE_FRAMES, scratch))
+        blend = bake_room(room, cameras, config, 4 * SEQUENCE_FRAMES, scratch)
+    if blend is not None:
+        room = replace(room, blend_path=blend)
     return Scene(room, actors, cameras)
 
 

@@ -26,7 +26,8 @@ def build_baked_material(name: str, images: dict[str, bpy.types.Image], constant
     tree.links.new(color, shader.inputs["Base Color"])
     tree.links.new(surface.outputs[0], shader.inputs["Roughness"])
     tree.links.new(surface.outputs[1], shader.inputs["Metallic"])
-    for socket, value in zip(GLOSS_INPUTS, constants.gloss or DEFAULT[GLOSS], strict=True):
+    gloss = DEFAULT[GLOSS] if constants.gloss is None else constants.gloss
+    for socket, value in zip(GLOSS_INPUTS, gloss, strict=True):
         shader.inputs[socket].default_value = value
     for socket, kept in constants.kept.items():
         shader.inputs[socket].default_value = kept if len(kept) > 1 else kept[0]

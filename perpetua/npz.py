@@ -92,6 +92,7 @@ def open_npz(path: Path, most_bytes: int = MOST_BYTES) -> Iterator[NpzFile]:
     """
     try:
         archive = zipfile.ZipFile(path)
+    # NotImplementedError: an archive that asks for a later version of the format.
     except (OSError, zipfile.BadZipFile, ValueError, EOFError, NotImplementedError) as error:
         raise ArchiveError(f"cannot read '{path}' as an .npz file: {error}") from None
     with archive:
