@@ -26,7 +26,8 @@ for installed in $venv/.installed-dev $venv/.installed; do
 done
 
 [ -x $venv/bin/pip ] || "$python" -m venv --clear $venv || fail "cannot make a virtual environment: on Debian or Ubuntu run: sudo apt-get install -y python3.11-venv"
-pip=($venv/bin/python -m pip install --disable-pip-version-check --quiet)
+pip=($venv/bin/python -m pip install --disable-pip-version-check)
+[ -t 1 ] || pip+=(--quiet)  # somebody who watches gigabytes arrive wants pip's progress
 
 echo "setup: installing pinned packages into $venv (about 4 GB, more with CUDA)"
 for lock in "${locks[@]}"; do

@@ -59,7 +59,7 @@ def run_submit(request: SubmitRequest, console: Console, dry_run: bool) -> None:
         for line in _submit(request, plan):
             say(line)
     if plan.rooms:
-        say(f"logs: {folder}\nhow far it is, from any node: perpetua status --out {generate.out}")
+        say(f"logs: {folder}\nhow far it is, from any node: perpetua status {generate.out}")
 
 
 def _plan(request: SubmitRequest) -> Plan:

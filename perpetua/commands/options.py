@@ -59,6 +59,9 @@ OUT_OPTION = click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True,
     help="Output folder.",
 )  # fmt: skip
+RUN_ARGUMENT = click.argument(
+    "out", metavar="[DIR]", default=Path("out"), type=click.Path(path_type=Path, file_okay=False)
+)
 PRESET_OPTION = click.option(
     "--preset", metavar="NAME", default="standard", show_default=True,
     shell_complete=_complete(lambda: dict.fromkeys(PRESETS, "")),

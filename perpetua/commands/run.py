@@ -14,6 +14,7 @@ from perpetua.commands.options import (
     PRESET_OPTION,
     REPLACE_OPTION,
     ROOMS_OPTION,
+    RUN_ARGUMENT,
     SEED_OPTION,
     SET_OPTION,
     START_ROOM_OPTION,
@@ -167,10 +168,10 @@ def submit(
 
 
 @click.command(short_help="How far an output folder is: rooms by stages, failures, time left.")
-@OUT_OPTION
+@RUN_ARGUMENT
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def status(out: Path, as_json: bool) -> None:
-    """Rooms and stages of an output folder: done, failed with its reason, time left."""
+    """Rooms and stages of the output folder DIR, "out" if none is named: done, failed with its reason, time left."""
     from perpetua.pipeline.status import read_status, status_table
 
     report = read_status(out)
@@ -183,10 +184,10 @@ def status(out: Path, as_json: bool) -> None:
 
 
 @click.command(short_help="Free the work area of finished rooms; sequences stay.")
-@OUT_OPTION
+@RUN_ARGUMENT
 @click.option("--all", "unfinished", is_flag=True, help="Also the work of rooms that are not finished.")
 def clean(out: Path, unfinished: bool) -> None:
-    """Free the work area of finished rooms. Sequences stay."""
+    """Free the work area of finished rooms in the output folder DIR, "out" if none is named. Sequences stay."""
     from perpetua.pipeline.cost import gigabytes
     from perpetua.pipeline.status import clean_work_area
 

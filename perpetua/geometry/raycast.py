@@ -6,6 +6,8 @@ quicker one to ask and slow to build; Warp's is refitted to moved vertices in mi
 """
 
 import importlib
+import os
+import sys
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, no_type_check
@@ -197,8 +199,18 @@ def _make_warp_mesh(
 def _warp() -> Any:
     """Warp, imported at the first query that needs it."""
     warp: Any = importlib.import_module("warp")
-    # Its greeting, and its warning where there is no GPU, say nothing about these searches, which run on the CPU.
+    # Its greeting, and its warning where there is no GPU, say nothing about these searches, which run on the CPU. The
+    # warning comes from its compiled part, which knows no level and writes to the process's own stderr.
     warp.config.log_level = warp.LOG_ERROR
+    sys.stderr.flush()
+    kept = os.dup(2)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        warp.init()
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
     return warp
 
 

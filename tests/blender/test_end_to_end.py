@@ -70,7 +70,7 @@ def test_actors_walk_and_cameras_move(finished: Path) -> None:
 
 def test_contact_sheet_and_status(finished: Path) -> None:
     assert _layout(finished).contact_sheet.stat().st_size > 10_000
-    status = json.loads(_perpetua("status", "--out", str(finished), "--json"))
+    status = json.loads(_perpetua("status", str(finished), "--json"))
     assert [room["state"] for room in status["rooms"]] == ["finished"]
     assert set(status["rooms"][0]["seconds"]) == {stage.name for stage in STAGES}
 
@@ -96,7 +96,7 @@ def test_killed_while_rendering_ends_in_the_same_bytes(finished: Path, tmp_path:
     undisturbed = output_hashes(_layout(finished).sequence_folder)
     assert output_hashes(_layout(tmp_path).sequence_folder) == undisturbed
 
-    _perpetua("clean", "--out", str(tmp_path))
+    _perpetua("clean", str(tmp_path))
     assert not (tmp_path / ".work").exists()
     assert "render ..." not in _perpetua("generate", *ONE_ROOM, "--out", str(tmp_path))
     assert output_hashes(_layout(tmp_path).sequence_folder) == undisturbed

@@ -133,7 +133,7 @@ def test_a_disturbed_cluster_makes_the_bytes_of_two_local_runs(cluster: SlurmClu
     said = _perpetua(*submit, environment=cluster.environment)
     assert "6 finished, 0 scheduled before, 0 to schedule" in said
 
-    status = json.loads(_perpetua("status", "--out", str(out), "--json"))
+    status = json.loads(_perpetua("status", str(out), "--json"))
     assert [room["state"] for room in status["rooms"]] == ["finished"] * ROOMS
     # Though a task was stopped while it rendered.
     _assert_nothing_was_made_twice(out)
@@ -145,5 +145,5 @@ def test_a_disturbed_cluster_makes_the_bytes_of_two_local_runs(cluster: SlurmClu
     for room in range(ROOMS):
         made, expected = (output_hashes(_layout(where, room).sequence_folder) for where in (out, local))
         assert len(made) > 10 and made == expected
-    _perpetua("clean", "--out", str(out))
+    _perpetua("clean", str(out))
     assert not (out / WORK_FOLDER).exists()

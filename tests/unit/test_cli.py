@@ -73,8 +73,8 @@ def test_standard_is_the_default_preset(tmp_path: Path) -> None:
         (("generate", "--device", "gpu"), "'gpu' is not one of"),
         (("config", "render"), "unexpected extra argument (render)"),
         (("completion", "tcsh"), "'tcsh' is not one of 'bash', 'zsh', 'fish'"),
-        (("status", "--out", "no-such-folder"), "holds no run of perpetua"),
-        (("clean", "--out", "no-such-folder"), "holds no run of perpetua"),
+        (("status", "no-such-folder"), "holds no run of perpetua"),
+        (("clean", "no-such-folder"), "holds no run of perpetua"),
         (("verify", "no-such-folder"), "'no-such-folder' does not exist"),
         (("verify", "."), "'.' holds no sequence"),
         (("preview", "no-such-folder"), "'no-such-folder' does not exist; the folder of a sequence is required"),
@@ -122,7 +122,7 @@ def test_what_the_system_refuses_is_no_traceback(
         raise error
 
     monkeypatch.setattr("perpetua.pipeline.status.read_status", refuse)
-    done = _perpetua("status", "--out", str(tmp_path))
+    done = _perpetua("status", str(tmp_path))
     assert done.exit_code == code
     assert done.output == f"perpetua: cannot use 'x.png': {error.strerror}\n"
 
@@ -181,7 +181,7 @@ def _config_json() -> str:
 
 def test_status_of_a_run_that_has_not_begun(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps({"seed": 7, "rooms": [0, 1], "config": json.loads(_config_json())}))
-    done = _perpetua("status", "--out", str(tmp_path), "--json")
+    done = _perpetua("status", str(tmp_path), "--json")
     report = json.loads(done.output)
     assert [room["state"] for room in report["rooms"]] == ["waiting", "waiting"]
     assert report["seconds_left"] is None
@@ -195,9 +195,9 @@ def test_status_of_a_sequence_that_other_settings_or_another_version_made(tmp_pa
     sequence = OutputLayout(tmp_path, load_config("tiny").export, 7, 1).sequence_folder
     sequence.mkdir(parents=True)
     (sequence / "audit.json").write_text(json.dumps({"key": "another", "rejected_draws": 0}))
-    report = json.loads(_perpetua("status", "--out", str(tmp_path), "--json").output)
+    report = json.loads(_perpetua("status", str(tmp_path), "--json").output)
     assert [room["state"] for room in report["rooms"]] == ["waiting", "outdated"]
-    assert "generate would replace it" in _perpetua("status", "--out", str(tmp_path)).output
+    assert "generate would replace it" in _perpetua("status", str(tmp_path)).output
 
 
 def test_assets_lists_licences() -> None:

@@ -1,5 +1,8 @@
 """Rays and distances against shapes with known answers and against a slow exact search."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import trimesh
@@ -153,3 +156,10 @@ def test_planes_along_rays() -> None:
     down = np.array([[0.0, 0, -1], [0.0, 0, -1], [0.0, 0, -1]])
     # The second ray runs along its plane, and the third triangle has none: what was found roughly counts.
     assert planes.along_m(eye_m, down, np.full(3, 9, np.float32)).tolist() == [3.0, 9.0, 9.0]
+
+
+def test_the_library_starts_without_a_word() -> None:
+    """It would greet, and warn where there is no GPU, in the middle of what a user reads."""
+    code = "import sys; from perpetua.geometry.raycast import _warp; _warp(); print('still here', file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
+    assert (done.stdout, done.stderr) == ("", "still here\n")
