@@ -16,7 +16,9 @@ World: Z up, metres, origin on the floor under the middle of the room.
 
 import gc
 import json
+from collections import defaultdict
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 import bpy
@@ -184,10 +186,12 @@ def _tidy(made: Made) -> None:
 
 def _write(folder: Path, job: dict, made: Made) -> None:
     _write_meshes(folder / "meshes.npz", made)
+    numbers = defaultdict(count)
     table = [
         {
             "object_index": thing.pass_index,
-            "name": thing.name,
+            # Infinigen's own names ("_table_coffee_legged_rand", "storage_rand.003") say little to a reader.
+            "name": f"{category}_{next(numbers[category])}",
             "category": category,
             "walkable": category in WALKABLE,
             "opaque": True,

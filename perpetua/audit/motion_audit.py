@@ -124,33 +124,35 @@ def audit_motion(
 
 def _checks(curves: dict[str, Float64[np.ndarray, "_ T"]], limits: MotionLimits) -> tuple[Check, ...]:
     routes, cameras = limits.routes, limits.cameras
+    turn_radps = float(np.radians(cameras.max_turn_deg_per_s))
     return (
         _at_least("route clearance", "actor", curves["actor_scene_m"], limits.navigation.body_radius_m),
         _at_least("route separation", "actor", curves["actor_apart_m"], routes.separation_m),
-        _at_most("route speed", "actor", curves["actor_speed_mps"], routes.max_speed_mps),
+        _at_most("route speed", "actor", curves["actor_speed_mps"], routes.max_speed_mps, "m/s"),
         _at_least("camera to scene", "camera", curves["camera_scene_m"], cameras.scene_clearance_m),
         _at_least("camera to actors", "camera", curves["camera_actor_m"], cameras.actor_clearance_m),
-        _at_most("camera speed", "camera", curves["camera_speed_mps"], cameras.max_speed_mps),
-        _at_most(
-            "camera turning", "camera", curves["camera_turn_radps"], float(np.radians(cameras.max_turn_deg_per_s))
-        ),
+        _at_most("camera speed", "camera", curves["camera_speed_mps"], cameras.max_speed_mps, "m/s"),
+        _at_most("camera turning", "camera", curves["camera_turn_radps"], turn_radps, "rad/s"),
     )
 
 
-def _at_least(name: str, who: str, curve: Float64[np.ndarray, "_ T"], limit: float) -> Check:
+def _at_least(name: str, who: str, curve_m: Float64[np.ndarray, "_ T"], limit_m: float) -> Check:
     # Distances beyond FAR_M are not told apart.
-    limit = min(limit, FAR_M)
-    index, frame = np.unravel_index(int(curve.argmin()), curve.shape)
-    value, passed = float(curve[index, frame]), bool(curve[index, frame] >= limit - SLACK_M)
-    detail = "" if passed else f"{who} {index} has {value:.3f} at frame {frame}; at least {limit:g} is required"
-    return Check(name, passed, value, f">= {limit:g}", detail)
+    limit_m = min(limit_m, FAR_M)
+    index, frame = np.unravel_index(int(curve_m.argmin()), curve_m.shape)
+    value_m = float(curve_m[index, frame])
+    passed = value_m >= limit_m - SLACK_M
+    detail = "" if passed else f"{who} {index} has {value_m:.3f} m at frame {frame}; at least {limit_m:g} m is required"
+    return Check(name, passed, value_m, f">= {limit_m:g} m", detail)
 
 
-def _at_most(name: str, who: str, curve: Float64[np.ndarray, "_ T"], limit: float) -> Check:
+def _at_most(name: str, who: str, curve: Float64[np.ndarray, "_ T"], limit: float, unit: str) -> Check:
     index, frame = np.unravel_index(int(curve.argmax()), curve.shape)
-    value, passed = float(curve[index, frame]), bool(curve[index, frame] <= limit * (1.0 + SLACK_SHARE))
-    detail = "" if passed else f"{who} {index} has {value:.3f} at frame {frame}; at most {limit:g} is allowed"
-    return Check(name, passed, value, f"<= {limit:g}", detail)
+    value = float(curve[index, frame])
+    passed = value <= limit * (1.0 + SLACK_SHARE)
+    most = f"{limit:.4g} {unit}"
+    detail = "" if passed else f"{who} {index} has {value:.3f} {unit} at frame {frame}; at most {most} is allowed"
+    return Check(name, passed, value, f"<= {most}", detail)
 
 
 def _sub_times(frames: int) -> Float64[np.ndarray, " N"]:

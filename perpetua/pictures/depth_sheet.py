@@ -44,14 +44,14 @@ def _chosen(sequence: Sequence, view: int, frames: list[int]) -> Float32[np.ndar
 
 
 def _scale(nearest_m: float, farthest_m: float) -> Image.Image:
-    """A bar of the colours with metres under it, evenly spread in inverse depth as the colours are."""
-    inverse = np.linspace(1.0 / nearest_m, 1.0 / farthest_m, SCALE_WIDTH_PX)
-    bar = depth_colours(np.tile(1.0 / inverse, (BAR_PX, 1)), nearest_m, farthest_m)
+    """A bar of the colours with metres under it."""
+    metres = np.linspace(nearest_m, farthest_m, SCALE_WIDTH_PX)
+    bar = depth_colours(np.tile(metres, (BAR_PX, 1)), nearest_m, farthest_m)
     scale = Image.new("RGB", (SCALE_WIDTH_PX + 60, SCALE_HEIGHT_PX), BACKGROUND)
     scale.paste(Image.fromarray(bar), (0, 0))
     draw = ImageDraw.Draw(scale)
     for place in np.linspace(0, SCALE_WIDTH_PX - 1, SCALE_TICKS).round().astype(int).tolist():
         draw.line([(place, BAR_PX), (place, BAR_PX + 4)], INK)
         anchor = "la" if place == 0 else "ma"
-        draw.text((place, BAR_PX + 6), f"{1.0 / inverse[place]:.1f} m", INK, text_font(13), anchor=anchor)
+        draw.text((place, BAR_PX + 6), f"{metres[place]:.1f} m", INK, text_font(13), anchor=anchor)
     return scale

@@ -57,12 +57,10 @@ class Canvas:
 
 
 def depth_colours(depth_m: Float[np.ndarray, "H W"], nearest_m: float, farthest_m: float) -> UInt8[np.ndarray, "H W 3"]:
-    """Near is bright, far is dark violet (by inverse depth, as the eye weighs distance); black where there is none."""
+    """Near is bright, far is dark violet, evenly in metres; black where there is none."""
     import cv2
 
-    with np.errstate(divide="ignore"):
-        inverse = np.where(depth_m > 0, 1.0 / depth_m, 0.0)
-    share = (inverse - 1.0 / farthest_m) / max(1.0 / nearest_m - 1.0 / farthest_m, 1e-9)
+    share = (farthest_m - depth_m) / max(farthest_m - nearest_m, 1e-9)
     level = (255 * np.clip(0.08 + 0.92 * share, 0.0, 1.0)).astype(np.uint8)
     colours = cv2.applyColorMap(level, cv2.COLORMAP_INFERNO)[:, :, ::-1]
     return np.ascontiguousarray(np.where((depth_m > 0)[:, :, None], colours, 0).astype(np.uint8))

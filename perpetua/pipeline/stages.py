@@ -359,6 +359,6 @@ STAGES = (
         Config.content,
         _export,
     ),
-    Stage(95, "audit", 4, ("actors", "cameras", "tracks", "export"), _settings("audit"), _audit),
+    Stage(95, "audit", 5, ("actors", "cameras", "tracks", "export"), _settings("audit"), _audit),
 )
 STAGE_NAMES = tuple(stage.name for stage in STAGES)

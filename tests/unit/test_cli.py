@@ -1,6 +1,8 @@
 """The command line as a user meets it."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import click
@@ -29,6 +31,11 @@ def test_every_command_explains_itself() -> None:
 
 def test_version() -> None:
     assert _perpetua("--version").output.strip() == f"perpetua, version {perpetua.__version__}"
+
+
+def test_the_package_is_the_program(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-m", "perpetua", "status", "none"], cwd=tmp_path, capture_output=True)
+    assert done.returncode == 2 and b"perpetua: 'none' holds no run" in done.stderr
 
 
 def test_dry_run_says_the_cost_and_writes_nothing(tmp_path: Path) -> None:

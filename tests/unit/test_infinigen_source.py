@@ -42,8 +42,8 @@ faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 1, 2], [0, 2, 
 np.savez(folder / "meshes.npz", vertices_m=vertices_m, faces=faces, vertex_start=[0, 4, 8], face_start=[0, 4, 6],
          collider_vertices_m=vertices_m[4:] - [0, 0, 0.01], collider_faces=faces[4:])
 objects = [
-    {"object_index": 1, "name": "bed", "category": "bed", "walkable": False, "opaque": True},
-    {"object_index": 2, "name": "room_floor_00", "category": "floor", "walkable": True, "opaque": True},
+    {"object_index": 1, "name": "bed_0", "category": "bed", "walkable": False, "opaque": True},
+    {"object_index": 2, "name": "floor_0", "category": "floor", "walkable": True, "opaque": True},
 ]
 square = [[-3, -3], [3, -3], [3, 3], [-3, 3]]
 table = {"kind": job["kind"], "floor_polygon_m": square, "height_m": job["dimensions_m"][2], "objects": objects}
