@@ -84,7 +84,7 @@ def _sdk() -> Any:
         return import_module("rerun")
     except ImportError:
         raise EnvironmentSetupError(
-            "a Rerun recording needs Rerun's SDK, which is not installed: pip install 'perpetua[rerun]'"
+            "a Rerun recording needs Rerun's SDK, which is not installed: .venv/bin/pip install -e '.[rerun]'"
         ) from None
 
 

@@ -46,7 +46,7 @@ class InfinigenRooms:
         if importlib.util.find_spec("infinigen2") is None:
             raise EnvironmentSetupError(
                 "rooms.source 'infinigen' needs the package infinigen2, which is not installed: run "
-                "pip install 'perpetua[infinigen]', or choose rooms.source=procedural"
+                ".venv/bin/pip install -e '.[infinigen]', or choose rooms.source=procedural"
             )
         return None
 
