@@ -1,7 +1,6 @@
 """A page of rooms, each from above and from two corners, to be looked at before anything is rendered of them."""
 
 import base64
-import html
 import io
 import shutil
 from collections.abc import Callable
@@ -15,6 +14,7 @@ from PIL import Image
 from perpetua.config import Config
 from perpetua.errors import PerpetuaError
 from perpetua.files import read_json, write_json
+from perpetua.html_page import html_environment, write_html
 from perpetua.navigation.types import NavGrid
 from perpetua.pictures.room_views import HEIGHT_PX, TOP, WIDTH_PX, place_views
 from perpetua.pipeline import codec
@@ -174,44 +174,16 @@ def _on_paper(view: RenderedView) -> UInt8[np.ndarray, "H W 3"]:
     return rgb
 
 
-STYLE = """
-body { font: 15px/1.4 system-ui, sans-serif; margin: 2rem auto; max-width: 1240px; padding: 0 1rem;
-       color: #23211d; background: #f6f4ef; }
-h1 { font-size: 1.3rem; } h2 { font-size: 1rem; margin: 0; text-transform: capitalize; }
-section { margin: 0 0 1.6rem; } p { margin: .1rem 0 .5rem; color: #5d584f; }
-.views { display: grid; grid-template-columns: repeat(3, 1fr); gap: 6px; }
-img { width: 100%; display: block; border-radius: 3px; } .failure { color: #a02c1c; white-space: pre-wrap; }
-"""
-
-
 def _write_page(request: GalleryRequest, cards: list[tuple[int, RoomCard]], pictures: Path) -> None:
     source = request.config.rooms.source
+    rooms = []
+    for index, card in cards:
+        stem = pictures / sequence_name(request.seed, index)
+        names = VIEW_NAMES if card.failure is None else ()
+        shown = [
+            {"name": name, "content": base64.b64encode(_picture(stem, name).read_bytes()).decode()} for name in names
+        ]
+        rooms.append({"card": card, "pictures": shown})
     title = f"{len(cards)} of {len(request.rooms)} rooms of seed {request.seed}, source {source}"
-    sections = [_section(card, pictures / sequence_name(request.seed, index)) for index, card in cards]
-    write_page(request.out / "index.html", title, sections)
-
-
-def write_page(path: Path, title: str, sections: list[str]) -> None:
-    """One HTML file that needs no other."""
-    body = "\n".join(sections)
-    text = (
-        f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>\n'
-        f'<meta name="viewport" content="width=device-width">\n<style>{STYLE}</style>\n'
-        f"<h1>{html.escape(title)}</h1>\n{body}\n</html>\n"
-    )
-    temporary = path.with_name(f".{path.name}.partial")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)
-
-
-def _section(card: RoomCard, stem: Path) -> str:
-    heading = f"<section><h2>{html.escape(card.title)}</h2>"
-    if card.failure is not None:
-        return f'{heading}<p class="failure">{html.escape(card.failure)}</p></section>'
-    images = "".join(_image(_picture(stem, name), name) for name in VIEW_NAMES)
-    return f'{heading}<p>{html.escape(card.facts)}</p><div class="views">{images}</div></section>'
-
-
-def _image(path: Path, name: str) -> str:
-    content = base64.b64encode(path.read_bytes()).decode()
-    return f'<img alt="{name}" src="data:image/jpeg;base64,{content}">'
+    environment = html_environment(Path(__file__).parent)
+    write_html(environment, "rooms.html.j2", request.out / "index.html", title=title, rooms=rooms)

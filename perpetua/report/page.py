@@ -4,10 +4,8 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 import perpetua
-from perpetua.errors import InputError
+from perpetua.html_page import html_environment, write_html
 from perpetua.report.dataset import charts, check_rows, compare, stage_rows
 from perpetua.report.gather import gather
 
@@ -32,7 +30,12 @@ def write_report(root: Path, folders: list[Path], page: Path, say: Callable[[str
     for one in figures:
         if one.measured is None:
             say(f"{one.folder}: {one.lacks[-1]}")
-    text = _environment().get_template(TEMPLATE).render(
+    environment = html_environment(Path(__file__).parent)
+    environment.filters |= {"figure": _figure, "duration": _duration, "known": _known}
+    write_html(
+        environment,
+        TEMPLATE,
+        page,
         title=root.resolve().name,
         version=perpetua.__version__,
         sequences=figures,
@@ -42,25 +45,7 @@ def write_report(root: Path, folders: list[Path], page: Path, say: Callable[[str
         checks=check_rows(figures),
         stages=stage_rows(figures),
         most_pictured=MOST_PICTURED,
-    )  # fmt: skip
-    try:
-        partial = page.with_name(f".{page.name}.partial")
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(page)
-    except OSError as error:
-        raise InputError(f"cannot write --out '{page}': {error}") from None
-
-
-def _environment() -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
     )
-    environment.filters |= {"figure": _figure, "duration": _duration, "known": _known}
-    return environment
 
 
 def _known(value: float) -> float | None:

@@ -248,7 +248,7 @@ def test_a_place_that_cannot_be_written_is_an_error(page: Path, tmp_path: Path) 
     data = tmp_path / "data"
     write_scene(data / "train" / "one")
     done = CliRunner().invoke(main, ["report", str(data), "--out", str(tmp_path / "nowhere" / "report.html")])
-    assert done.exit_code == 2 and "cannot write --out" in done.output
+    assert done.exit_code == 2 and "cannot write '" in done.output
 
 
 # The page in a browser
