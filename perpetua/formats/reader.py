@@ -15,7 +15,7 @@ from perpetua.formats.safe_pickle import read_byte_arrays
 from perpetua.npy import open_npy
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SequenceView:
     """One view. ``depth_m`` (0: none), ``foreground`` and ``object_index`` stay on disk until they are read, and may be
     missing."""
@@ -28,6 +28,10 @@ class SequenceView:
     foreground: Bool[np.ndarray, "F H W"] | None
     object_index: UInt16[np.ndarray, "F H W"] | None = None
 
+    def __repr__(self) -> str:
+        files = [name for name in ("depth_m", "foreground", "object_index") if getattr(self, name) is not None]
+        return f"SequenceView({', '.join([f'{len(self.jpeg)} frames', *files])})"
+
     def image(self, frame: int) -> UInt8[np.ndarray, "H W 3"]:
         """The decoded RGB image of a frame."""
         import cv2
@@ -38,7 +42,7 @@ class SequenceView:
         return np.ascontiguousarray(decoded[:, :, ::-1], np.uint8)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Sequence:
     """A sequence as on disk: tracks in world metres, queries (x, y, frame, view), one entry per view."""
 
@@ -46,6 +50,10 @@ class Sequence:
     tracks_m: Float32[np.ndarray, "F P 3"]
     queries_xytv: Float32[np.ndarray, "P 4"]
     views: tuple[SequenceView, ...]
+
+    def __repr__(self) -> str:
+        frames, tracks, _ = self.tracks_m.shape
+        return f"Sequence('{self.folder}': {frames} frames, {len(self.views)} views, {tracks:,} tracks)"
 
     @cached_property
     def record(self) -> dict[str, Any] | None:

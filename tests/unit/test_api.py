@@ -52,6 +52,17 @@ def test_open_gives_typed_arrays(tmp_path: Path) -> None:
         assert view.image(0).shape == (*view.depth_m.shape[1:], 3)
 
 
+def test_what_a_notebook_shows_of_a_sequence_is_a_line(tmp_path: Path) -> None:
+    write_scene(tmp_path / "made")
+    sequence = perpetua.open(tmp_path / "made")
+    frames, tracks, _ = sequence.tracks_m.shape
+    assert (
+        repr(sequence)
+        == f"Sequence('{tmp_path / 'made'}': {frames} frames, {len(sequence.views)} views, {tracks:,} tracks)"
+    )
+    assert repr(sequence.views[0]) == f"SequenceView({frames} frames, depth_m, foreground)"
+
+
 def test_generate_returns_the_folders_in_order(asked: dict[str, Any], tmp_path: Path) -> None:
     settings = {"actors.count": 2, "sequence.frames": 4}
     made = perpetua.generate(tmp_path, seed=5, rooms=range(3, 5), preset="tiny", settings=settings, quiet=True)
