@@ -33,7 +33,7 @@ from perpetua.pipeline.free_memory import free_memory_mb
 from perpetua.pipeline.layout import LOG_FILE, OutputLayout, check_writable, open_run
 from perpetua.pipeline.lease import hold
 from perpetua.pipeline.progress import Progress
-from perpetua.pipeline.runner import RoomRun
+from perpetua.pipeline.runner import RoomRun, published_redraw
 from perpetua.pipeline.stages import STAGE_NAMES, STAGES
 from perpetua.pipeline.store import StageFolder
 from perpetua.pipeline.troubles import explained
@@ -114,10 +114,10 @@ def make_rooms(request: GenerateRequest, until: str, console: Console) -> dict[i
         The reason of failure of each room that failed.
 
     Raises:
-        InputError: the output folder was made with other settings, or cannot be written to.
+        InputError: see ``open_folder``.
         KeyboardInterrupt: the user stopped the work; what is finished stays.
     """
-    open_run(request.out, request.seed, request.rooms, request.config, request.replace)
+    open_folder(request, until)
     work = room_work(request, until)
     workers = request.workers
     if workers == 0:
@@ -128,6 +128,25 @@ def make_rooms(request: GenerateRequest, until: str, console: Console) -> dict[i
         failures = run_rooms(request.rooms, workers, work, progress.show)
     note_failures(request, failures)
     return failures
+
+
+def open_folder(request: GenerateRequest, until: str = STAGES[-1].name) -> None:
+    """Records the rooms asked for in the output folder, which keeps what it holds unless ``replace`` was given.
+
+    Raises:
+        InputError: the folder was made with other settings, holds sequences of another version of the program, or
+            cannot be written to.
+    """
+    open_run(request.out, request.seed, request.rooms, request.config, request.replace)
+    if request.replace or until != STAGES[-1].name:
+        return
+    for room in request.rooms:
+        layout = OutputLayout(request.out, request.config.export, request.seed, room)
+        if layout.sequence_folder.is_dir() and published_redraw(layout, request.config) is None:
+            raise InputError(
+                f"'{layout.sequence_folder}' is not what this version of perpetua makes of these settings: choose "
+                "another --out, or pass --replace to make it and others like it anew"
+            )
 
 
 def exit_code(request: GenerateRequest, failures: dict[int, str]) -> int:

@@ -10,9 +10,9 @@ from perpetua.cluster import slurm
 from perpetua.cluster.plan import LAST_OF_GEOMETRY, Plan, Resources, make_plan
 from perpetua.cluster.task import RoomsTask
 from perpetua.errors import InputError
-from perpetua.generation import GenerateRequest, check_inputs
+from perpetua.generation import GenerateRequest, check_inputs, open_folder
 from perpetua.pipeline.cost import estimate_cost, gigabytes
-from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout, RunRecord, open_run
+from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout, RunRecord
 from perpetua.pipeline.lease import hold_when_free
 from perpetua.pipeline.stages import STAGES
 
@@ -49,7 +49,7 @@ def run_submit(request: SubmitRequest, console: Console, dry_run: bool) -> None:
         raise InputError(
             f"tasks with the former settings of '{generate.out}' are scheduled: scancel them, then --replace"
         )
-    open_run(generate.out, generate.seed, generate.rooms, generate.config, generate.replace)
+    open_folder(generate)
     slurm.open_folder(folder)
     # Of two that submit at once, the second must see what the first has scheduled.
     with hold_when_free(folder):

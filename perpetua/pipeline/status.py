@@ -23,7 +23,8 @@ _MOST_LISTED = 50
 class RoomStatus:
     """How far one room is. ``seconds`` holds the time of each finished stage.
 
-    ``outdated``: its sequence is there, made with other settings or by another version, and ``generate`` replaces it.
+    ``outdated``: its sequence is there, made with other settings or by another version; ``generate --replace`` makes it
+    anew.
     ``worker`` is who works on it, as far as can be told: of another machine also one that just ended without a word.
     """
 
@@ -76,7 +77,7 @@ class StatusReport:
         if any(room.state == "outdated" for room in self.rooms):
             lines.append(
                 "outdated: the sequence was made with other settings or by another version of perpetua, and generate "
-                "would replace it; to keep it, generate to another --out"
+                "--replace would make it anew; to keep it, generate to another --out"
             )
         done = sum(room.finished for room in self.rooms)
         left = self.seconds_left

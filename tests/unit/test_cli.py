@@ -194,7 +194,7 @@ def test_status_of_a_run_that_has_not_begun(tmp_path: Path) -> None:
     assert report["seconds_left"] is None
 
 
-def test_status_of_a_sequence_that_other_settings_or_another_version_made(tmp_path: Path) -> None:
+def test_sequences_of_another_version_are_named_and_kept(tmp_path: Path) -> None:
     from perpetua.config import load_config
     from perpetua.pipeline.layout import OutputLayout
 
@@ -204,7 +204,11 @@ def test_status_of_a_sequence_that_other_settings_or_another_version_made(tmp_pa
     (sequence / "audit.json").write_text(json.dumps({"key": "another", "rejected_draws": 0}))
     report = json.loads(_perpetua("status", str(tmp_path), "--json").output)
     assert [room["state"] for room in report["rooms"]] == ["waiting", "outdated"]
-    assert "generate would replace it" in _perpetua("status", str(tmp_path)).output
+    assert "--replace would make it anew" in _perpetua("status", str(tmp_path)).output
+    again = ("generate", "--preset", "tiny", "--seed", "7", "--out", str(tmp_path))
+    done = _perpetua(*again, "--rooms", "2")
+    assert done.exit_code == 2 and f"'{sequence}' is not what this version" in done.output.replace("\n", " ")
+    assert [path.name for path in sequence.iterdir()] == ["audit.json"]
 
 
 def test_assets_lists_licences() -> None:
