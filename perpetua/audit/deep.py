@@ -17,6 +17,7 @@ from perpetua.audit.files import SequenceFiles
 from perpetua.audit.geometry import camera_centre_m, depth_of_planes, project_to_pixels
 from perpetua.audit.on_meshes import check_on_meshes
 from perpetua.audit.report import Check
+from perpetua.audit.tally import Tally, check_of
 
 NOTHING = 0
 # Depth bends by more than this share of itself from pixel to pixel only at silhouettes and creases.
@@ -120,27 +121,6 @@ def _along(
         return np.nan_to_num(height / (direction * normal).sum(axis=1), nan=np.inf)
 
 
-@dataclass
-class _Share:
-    """Entries tested and wrong, with the first wrong one in words."""
-
-    tested: int = 0
-    wrong: int = 0
-    first: str = ""
-
-    def add(self, wrong: Bool[np.ndarray, "*any"], tested: Bool[np.ndarray, "*any"], where: str) -> None:
-        bad = wrong & tested
-        self.tested, self.wrong = self.tested + int(tested.sum()), self.wrong + int(bad.sum())
-        if bad.any() and not self.first:
-            self.first = f"{where}, at {np.argwhere(bad)[0].tolist()}"
-
-    def check(self, name: str, least: float) -> Check:
-        share = 1.0 - self.wrong / max(self.tested, 1)
-        passed = share >= least
-        detail = "" if passed else f"{self.wrong} of {self.tested} differ, first {self.first}"
-        return Check(name, passed, share, f">= {least:g} of entries", detail)
-
-
 def verify_deep(
     files: SequenceFiles, table: dict[str, np.ndarray], scene: DeepScene, bounds: AuditConfig, frames: int
 ) -> list[Check]:
@@ -154,32 +134,34 @@ def verify_deep(
         frames: how many frames are looked at, at even distances.
     """
     rays = SceneRays(scene)
-    depth, objects, sight = _Share(), _Share(), _Share()
+    depth = Tally("differs from what a ray at the meshes meets", bounds.deep_agreement)
+    objects = Tally("differs from what a ray at the meshes meets", bounds.deep_agreement)
+    sight = Tally("differs from what a ray at the meshes says", bounds.deep_visibility)
     total = len(files.arrays["tracks_xyz.npy"])
     chosen = np.unique(np.linspace(0, total - 1, frames).round().astype(int)).tolist()
     for frame in chosen:
         for number, view in enumerate(files.views):
-            where = f"view {view}, frame {frame}"
             predicted_m, owner = predict_image(files, rays, view, frame)
             clear = off_silhouettes(predicted_m, owner)
             rendered_m = np.asarray(files.of_view(int(view), "depth.npy")[frame], np.float64)
             allowed_m = bounds.deep_depth_m + bounds.deep_depth_share * predicted_m
-            depth.add(np.abs(rendered_m - predicted_m) > allowed_m, clear, where)
+            depth.add(f"{view}/depth.npy[{frame}", np.abs(rendered_m - predicted_m) > allowed_m, clear)
             if scene.object_index is None:
                 on_actor = np.isin(owner, [actor.object_index for actor in scene.actors])
-                objects.add(on_actor != files.of_view(int(view), "foreground_mask.npy")[frame], clear, where)
+                foreground = files.of_view(int(view), "foreground_mask.npy")[frame]
+                objects.add(f"{view}/foreground_mask.npy[{frame}", on_actor != foreground, clear)
             else:
-                objects.add(owner != scene.object_index[number][frame], clear, where)
+                objects.add(f"object index of view {view}[{frame}", owner != scene.object_index[number][frame], clear)
             reached, shown = _evidence(files, table, rays, view, frame, owner)
             visible = np.asarray(files.of_view(int(view), "visibility.npy")[frame])
             # Entries off the image count: calling them visible would be wrong. What no pixel around shows is hidden
             # by the format's rule.
             wrong = np.where(shown, visible != reached, visible)
-            sight.add(wrong, np.ones(len(wrong), bool), where)
+            sight.add(f"{view}/visibility.npy[{frame}", wrong)
     return [
-        depth.check("depth by rays", bounds.deep_agreement),
-        objects.check("objects by rays", bounds.deep_agreement),
-        sight.check("visibility by rays", bounds.deep_visibility),
+        check_of("depth by rays", [depth]),
+        check_of("objects by rays", [objects]),
+        check_of("visibility by rays", [sight]),
         check_on_meshes(files, table, scene, bounds, chosen),
     ]
 

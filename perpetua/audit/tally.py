@@ -1,5 +1,6 @@
 """Counts of entries that were tested and failed, with the first failure in words."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,14 +36,22 @@ class Tally:
     failed: int = 0
     first: str = ""
 
-    def add(self, name: str, failed: Bool[np.ndarray, "*any"], tested: Bool[np.ndarray, "*any"] | None = None) -> None:
-        """Counts entries of a file's frame, called ``name``; those not ``tested`` do not count."""
+    def add(
+        self,
+        name: str,
+        failed: Bool[np.ndarray, "*any"],
+        tested: Bool[np.ndarray, "*any"] | None = None,
+        figures: Callable[[int], str] | None = None,
+    ) -> None:
+        """Counts entries of a file's frame, called ``name``; those not ``tested`` do not count. ``figures`` says more
+        of the entry of a flat index."""
         bad = failed if tested is None else failed & tested
         self.tested += failed.size if tested is None else int(tested.sum())
         self.failed += int(bad.sum())
         if bad.any() and not self.first:
             place = ", ".join(str(index) for index in np.argwhere(bad)[0])
-            self.first = f"{name}, {place}]"
+            more = "" if figures is None else f": {figures(int(np.flatnonzero(bad)[0]))}"
+            self.first = f"{name}, {place}] {self.words}{more}"
 
     @property
     def share(self) -> float:
@@ -54,11 +63,12 @@ class Tally:
         """What is wrong; empty where enough entries keep the rule."""
         if few_enough(self.failed, self.tested, self.least):
             return ""
-        return f"{self.first} {self.words} ({self.failed} of {self.tested} entries)"
+        return f"{self.first} ({self.failed} of {self.tested} entries)"
 
 
 def check_of(name: str, tallies: list[Tally]) -> Check:
     """One check of several rules; its value is the lowest share."""
     faults = [tally.fault for tally in tallies if tally.fault]
-    bound = f">= {min(tally.least for tally in tallies):g} of entries"
+    least = min(tally.least for tally in tallies)
+    bound = f">= {least:g} of entries" + (", or all but one" if least < 1.0 else "")
     return Check(name, not faults, min(tally.share for tally in tallies), bound, "; ".join(faults[:3]))

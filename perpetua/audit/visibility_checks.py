@@ -1,6 +1,7 @@
 """Checks of visibility against depth and foreground, at the pixel centres around each projection."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float64
@@ -9,32 +10,13 @@ from perpetua.audit.config import AuditConfig
 from perpetua.audit.files import SequenceFiles
 from perpetua.audit.geometry import camera_centre_m, depth_of_planes, project_to_pixels
 from perpetua.audit.report import Check
-from perpetua.audit.tally import few_enough
+from perpetua.audit.tally import Tally, check_of
 
 # A hidden point counts as unexplained only where depth shows its surface beyond doubt.
 SHARP = 0.1
 # A pixel covers more of a surface that it sees at an angle, up to this cosine.
 STEEPEST = 0.17
 AROUND = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-
-
-@dataclass
-class _Tally:
-    """Entries that were tested and those that failed, with the first failure in words."""
-
-    tested: int = 0
-    failed: int = 0
-    first: str = ""
-
-    def add(self, name: str, frame: int, tracks: np.ndarray, failed: np.ndarray, words: str) -> None:
-        self.tested += len(tracks)
-        self.failed += int(failed.sum())
-        if failed.any() and not self.first:
-            self.first = f"{name}[{frame}, {int(tracks[failed][0])}] {words}"
-
-    @property
-    def share(self) -> float:
-        return self.failed / max(self.tested, 1)
 
 
 @dataclass(frozen=True)
@@ -56,33 +38,36 @@ class _Evidence:
 def check_visibility(files: SequenceFiles, on_actor: Bool[np.ndarray, " P"] | None, bounds: AuditConfig) -> list[Check]:
     """Visible entries lie on the image, at their own surface's rendered depth, on foreground just when on an actor;
     hidden ones are not plainly in view. Without ``surface_xyz.npy`` a point's own depth stands for its surface's."""
-    outside, depth, foreground, hidden = _Tally(), _Tally(), _Tally(), _Tally()
     has_surface = "surface_xyz.npy" in files.arrays
+    least = bounds.depth_agreement if has_surface else bounds.point_depth_agreement
+    outside = Tally("is visible, and projects outside the image", 1.0)
+    depth = Tally("is visible, and depth.npy shows another surface in all pixels around", least)
+    foreground = Tally(
+        "is visible, and foreground_mask.npy disagrees with its object's kind in all pixels around",
+        bounds.foreground_agreement,
+    )
+    hidden = Tally("is hidden, and depth shows its surface", 1.0 - bounds.unexplained_hidden)
     for view in files.views:
-        visibility, name = files.arrays[f"{view}/visibility.npy"], f"{view}/visibility.npy"
+        visibility = files.arrays[f"{view}/visibility.npy"]
         for frame in range(len(visibility)):
-            shown = _evidence(files, view, frame)
+            shown, name = _evidence(files, view, frame), f"{view}/visibility.npy[{frame}"
             visible = np.asarray(visibility[frame])
-            tracks = np.flatnonzero(visible)
-            outside.add(name, frame, tracks, ~shown.inside[tracks], "is visible, and projects outside the image")
+            outside.add(name, ~shown.inside, visible)
             agrees = (_agrees(shown, bounds, 1.0) | _near_by(shown)).any(axis=1)
-            depth.add(name, frame, tracks, ~agrees[tracks], _depth_words(shown, tracks, agrees))
+            depth.add(name, ~agrees, visible, partial(_depth_figures, shown))
             if on_actor is not None:
                 right = (shown.foreground == on_actor[:, None]) & shown.on_image
-                words = "is visible, and foreground_mask.npy disagrees with its object's kind in all pixels around"
-                foreground.add(name, frame, tracks, ~right.any(axis=1)[tracks], words)
-                tracks = np.flatnonzero(~visible & shown.inside)
+                foreground.add(name, ~right.any(axis=1), visible)
                 plain = (_agrees(shown, bounds, SHARP) & right).all(axis=1) & shown.facing
-                hidden.add(name, frame, tracks, plain[tracks], "is hidden, and depth shows its surface")
-    least = bounds.depth_agreement if has_surface else bounds.point_depth_agreement
+                hidden.add(name, plain, ~visible & shown.inside)
     checks = [
-        _bounded("visible on image", outside, 1.0),
-        _bounded("depth agreement" if has_surface else "depth agreement of points", depth, least),
+        check_of("visible on image", [outside]),
+        check_of("depth agreement" if has_surface else "depth agreement of points", [depth]),
     ]
     if on_actor is not None:
-        checks.append(_bounded("foreground agreement", foreground, bounds.foreground_agreement))
+        checks.append(check_of("foreground agreement", [foreground]))
     if on_actor is not None and has_surface:
-        checks.append(_bounded("hidden for a reason", hidden, 1.0 - bounds.unexplained_hidden))
+        checks.append(check_of("hidden for a reason", [hidden]))
     return checks
 
 
@@ -133,20 +118,8 @@ def _near_by(shown: _Evidence) -> Bool[np.ndarray, "P 4"]:
     )
 
 
-def _depth_words(shown: _Evidence, tracks: np.ndarray, agrees: np.ndarray) -> str:
-    bad = tracks[~agrees[tracks]]
-    if len(bad) == 0:
-        return ""
+def _depth_figures(shown: _Evidence, track: int) -> str:
     expected, rendered = (
-        ", ".join(f"{depth:.4f}" for depth in depths[bad[0]]) for depths in (shown.expected_m, shown.rendered_m)
+        ", ".join(f"{depth:.4f}" for depth in depths[track]) for depths in (shown.expected_m, shown.rendered_m)
     )
-    return (
-        f"is visible, its surface is at {expected} m on the rays of the pixels around, and depth.npy has {rendered} m"
-    )
-
-
-def _bounded(name: str, tally: _Tally, least: float) -> Check:
-    share = 1.0 - tally.share
-    passed = few_enough(tally.failed, tally.tested, least)
-    detail = "" if passed else f"{tally.failed} of {tally.tested} entries fail, first {tally.first}"
-    return Check(name, passed, share, f">= {least:g} of entries", detail)
+    return f"its surface is at {expected} m on the rays of the pixels around, and depth.npy has {rendered} m"
