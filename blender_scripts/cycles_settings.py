@@ -16,8 +16,8 @@ def choose_device(wanted: str, worker: int, workers: int) -> tuple[str, str, str
     if enabled is not None:
         backend, names = enabled
         return backend, ", ".join(names), None
-    kind = "GPU" if wanted == "auto" else f"{wanted} device"
-    return "cpu", _threads(), f"no {kind} that Cycles can use was found: rendering on the CPU"
+    warning = None if wanted == "auto" else f"no {wanted} device that Cycles can use was found: rendering on the CPU"
+    return "cpu", _threads(), warning
 
 
 def _threads() -> str:
