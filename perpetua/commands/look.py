@@ -10,7 +10,7 @@ from perpetua.commands.options import CONFIG_OPTION, DEVICE_OPTION, PRESET_OPTIO
 from perpetua.config import load_config
 from perpetua.errors import InputError
 
-PICTURES = ("sheet", "video", "plan", "depth", "objects")
+PICTURES = ("sheet", "video", "plan", "depth", "objects", "animation")
 PICTURE_SUFFIXES = (".png", ".jpg")
 
 
@@ -52,6 +52,7 @@ def preview(
     plan     the room from above with the ways of people and cameras, and curves of how they move
     depth    depth of all views, with a scale
     objects  which object each pixel shows
+    animation  the video as an animated WebP for a web page, drawn only with --only animation
 
     With --rooms, rooms are made as generate makes them, in a folder that a later generate with the same settings
     goes on from. --seed, --preset, --config, --set and --device are for --rooms and --actors.
@@ -82,7 +83,7 @@ def preview(
 def _preview_sequence(sequence: Path, out: Path | None, only: tuple[str, ...], times: int) -> None:
     from perpetua.pictures.preview_set import write_previews
 
-    if out is not None and out.suffix.lower() in (*PICTURE_SUFFIXES, ".mp4"):
+    if out is not None and out.suffix.lower() in (*PICTURE_SUFFIXES, ".mp4", ".webp"):
         raise InputError(
             f"preview writes files of its own names into a folder, and '{out}' names a file: give a folder, and "
             "--only sheet for the contact sheet alone"

@@ -10,17 +10,19 @@ from perpetua.pictures.contact_sheet import write_contact_sheet
 from perpetua.pictures.depth_sheet import write_depth_sheet
 from perpetua.pictures.object_sheet import write_object_sheet
 from perpetua.pictures.plan_view import write_plan_view
-from perpetua.pictures.video import write_video
+from perpetua.pictures.video import write_animation, write_video
 from perpetua.pipeline.convert import load_source
 
 
 @dataclass(frozen=True)
 class _Picture:
-    """A file of the set: how it is drawn from a source and a number of times, and why it may not be (None: it can)."""
+    """A file of the set: how it is drawn from a source and a number of times, and why it may not be (None: it can).
+    Some are drawn only if they are asked for."""
 
     file: str
     draw: Callable[[ExportSource, Path, int], None]
     lack: Callable[[ExportSource], str | None] = lambda source: None
+    usual: bool = True
 
 
 def _no_depth(source: ExportSource) -> str | None:
@@ -45,6 +47,9 @@ PICTURES = {
         "depth.jpg", lambda source, file, times: write_depth_sheet(source.sequence, file, times), _no_depth
     ),
     "objects": _Picture("objects.png", write_object_sheet, _no_objects),
+    "animation": _Picture(
+        "animation.webp", lambda source, file, times: write_animation(source.sequence, source.fps, file), usual=False
+    ),
 }
 
 
@@ -56,7 +61,7 @@ def write_previews(
     Args:
         sequence_folder: the sequence.
         folder: is made if need be; pictures of the same names are replaced.
-        only: names of ``PICTURES``; none for all that the sequence allows.
+        only: names of ``PICTURES``; none for the usual ones, as far as the sequence allows.
         times: frames that the sheets show.
         say: takes a line for the user.
 
@@ -69,7 +74,7 @@ def write_previews(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot write into --out '{folder}': {error}") from None
-    for name in only or PICTURES:
+    for name in only or (name for name, picture in PICTURES.items() if picture.usual):
         picture, target = PICTURES[name], folder / PICTURES[name].file
         lack = picture.lack(source)
         if lack is not None and only:

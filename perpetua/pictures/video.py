@@ -1,4 +1,4 @@
-"""An MP4 of all views side by side, in step, with tracks."""
+"""All views side by side, in step, with tracks: as an MP4, or as an animated picture for web pages."""
 
 import math
 from collections.abc import Iterator
@@ -17,6 +17,8 @@ CELL_WIDTH_PX = 480
 GAP_PX = 4
 # What a player draws as it was: near to lossless to the eye, and not much larger.
 QUALITY = "18"
+# A picture that a page loads at once: smaller, and lossy enough to be light.
+ANIMATION_WIDTH_PX, ANIMATION_QUALITY = 640, 45
 
 
 def write_video(sequence: Sequence, fps: float, video: Path) -> None:
@@ -25,9 +27,25 @@ def write_video(sequence: Sequence, fps: float, video: Path) -> None:
     Raises:
         SequenceFormatError: an image of the sequence cannot be read.
     """
+    encode(_frames(sequence), fps, video)
+
+
+def write_animation(sequence: Sequence, fps: float, picture: Path) -> None:
+    """Writes an animated WebP that repeats, at ``fps`` frames per second.
+
+    Raises:
+        SequenceFormatError: an image of the sequence cannot be read.
+    """
+    frames = [Image.fromarray(rgb) for rgb in _frames(sequence)]
+    size = (ANIMATION_WIDTH_PX, round(ANIMATION_WIDTH_PX * frames[0].height / frames[0].width))
+    first, *rest = [frame.resize(size, Image.Resampling.LANCZOS) for frame in frames]
+    length_ms = round(1000.0 / fps)
+    first.save(picture, save_all=True, append_images=rest, duration=length_ms, loop=0, quality=ANIMATION_QUALITY)
+
+
+def _frames(sequence: Sequence) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
     shown = choose_tracks(sequence)
-    frames = (_frame(sequence, frame, shown) for frame in range(len(sequence.tracks_m)))
-    encode(frames, fps, video)
+    return (_frame(sequence, frame, shown) for frame in range(len(sequence.tracks_m)))
 
 
 def encode(frames: Iterator[UInt8[np.ndarray, "H W 3"]], fps: float, video: Path) -> None:

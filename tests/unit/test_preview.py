@@ -21,6 +21,7 @@ from perpetua.pictures.depth_sheet import write_depth_sheet
 from perpetua.pictures.object_sheet import write_object_sheet
 from perpetua.pictures.sheets import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX
 from perpetua.pictures.track_marks import choose_tracks, draw_tracks
+from perpetua.pipeline.convert import load_source
 
 # The synthetic scene: 6 frames of 2 or more views of 96 x 72 px.
 CELL_HEIGHT_PX = CELL_WIDTH_PX * 72 // 96
@@ -65,6 +66,21 @@ def test_video_shows_all_views_in_step_at_the_sequences_rate(sequence: Sequence,
             ]
             assert int(np.argmin(errors)) == number
             assert errors[number] < 4.0
+
+
+def test_animation_repeats_the_video_in_time(made: tuple[Path, Scene], tmp_path: Path) -> None:
+    code, said = run(str(made[0]), "--out", str(tmp_path / "set"), "--only", "animation")
+    assert code == 0, said
+    source = load_source(made[0])
+    with Image.open(tmp_path / "set" / "animation.webp") as picture:
+        assert getattr(picture, "n_frames", 1) == len(source.sequence.tracks_m)
+        assert picture.width == video.ANIMATION_WIDTH_PX and picture.info["loop"] == 0
+        for number, large in enumerate(video._frames(source.sequence)):
+            picture.seek(number)
+            picture.load()
+            small = np.asarray(Image.fromarray(large).resize(picture.size), float)
+            assert np.abs(small - np.asarray(picture.convert("RGB"), float)).mean() < 6.0
+            assert picture.info["timestamp"] == pytest.approx(number * 1000.0 / source.fps, abs=number)
 
 
 @pytest.mark.parametrize("views", [1, 2, 3])
