@@ -28,12 +28,12 @@ CAMERAS = ("black", "darkorange", "teal", "crimson", "slateblue", "olive")
 # What is drawn of the audit's curves: title, curve, whether of people.
 CURVES = (
     ("people: speed, m/s", "actor_speed_mps", True),
-    ("people: to furniture and walls, m", "actor_scene_m", True),
+    ("people: to furniture and walls, m (1: or more)", "actor_scene_m", True),
     ("people: to each other, m", "actor_apart_m", True),
     ("people: seen by so many views", "views_seeing", True),
     ("cameras: speed, m/s", "camera_speed_mps", False),
-    ("cameras: to the scene, m", "camera_scene_m", False),
-    ("cameras: to people, m", "camera_actor_m", False),
+    ("cameras: to the scene, m (1: or more)", "camera_scene_m", False),
+    ("cameras: to people, m (1: or more)", "camera_actor_m", False),
 )
 
 

@@ -54,6 +54,12 @@ FAULTS = (
         "test_told_to_stop_it_stops_cleanly_and_says_how_to_go_on",
     ),
     Fault(
+        "a newer version of Perpetua on a folder of finished sequences",
+        "exit code 2, nothing is touched; --replace makes them anew",
+        "unit/test_cli.py",
+        "test_sequences_of_another_version_are_named_and_kept",
+    ),
+    Fault(
         "two runs on one folder at once",
         "each stage and frame is made by one of them; both end with all rooms; the bytes of a run on a cluster",
         "cluster/test_slurm.py",
