@@ -250,6 +250,8 @@ def _say_result(request: GenerateRequest, failures: dict[int, str], until: str, 
             say(f"room {room}: {layout.sequence_folder}\n  look at {layout.contact_sheet}")
         else:
             say(f"room {room}: done through '{until}' in {layout.work_folder}")
+    if until == STAGE_NAMES[-1] and len(failures) < len(request.rooms):
+        say(f"pictures, figures and checks of all on a page: perpetua report {shlex.quote(str(request.out))}")
     if failures:
         say(f"{len(failures)} of {len(request.rooms)} rooms failed; to try them again:\n  {_this_command()}")
 
