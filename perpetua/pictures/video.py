@@ -18,7 +18,7 @@ GAP_PX = 4
 # What a player draws as it was: near to lossless to the eye, and not much larger.
 QUALITY = "18"
 # A picture that a page loads at once: smaller, and lossy enough to be light.
-ANIMATION_WIDTH_PX, ANIMATION_QUALITY = 640, 45
+ANIMATION_WIDTH_PX, ANIMATION_QUALITY = 640, 52
 
 
 def write_video(sequence: Sequence, fps: float, video: Path) -> None:
@@ -40,7 +40,8 @@ def write_animation(sequence: Sequence, fps: float, picture: Path) -> None:
     size = (ANIMATION_WIDTH_PX, round(ANIMATION_WIDTH_PX * frames[0].height / frames[0].width))
     first, *rest = [frame.resize(size, Image.Resampling.LANCZOS) for frame in frames]
     length_ms = round(1000.0 / fps)
-    first.save(picture, save_all=True, append_images=rest, duration=length_ms, loop=0, quality=ANIMATION_QUALITY)
+    repeated = {"save_all": True, "append_images": rest, "duration": length_ms, "loop": 0}
+    first.save(picture, "WebP", quality=ANIMATION_QUALITY, minimize_size=True, **repeated)
 
 
 def _frames(sequence: Sequence) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
