@@ -25,23 +25,19 @@ USUAL_FPS = 24.0
 
 @dataclass(frozen=True)
 class SequenceFigures:
-    """A sequence on the page. ``lacks`` says what could not be known, and why.
+    """A sequence on the page, which has ``name`` there. ``lacks`` says what could not be known, and why.
 
     ``measured`` is None where the files cannot be read; ``pictures`` are data URIs, one per view, or none.
     """
 
     folder: Path
+    name: str
     lacks: tuple[str, ...]
     record: SequenceRecord
     checks: tuple[CheckRecord, ...]
     stages: dict[str, StageEvent]
     measured: Measured | None = None
     pictures: tuple[str, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """The sequence's folder."""
-        return self.folder.resolve().name
 
     @property
     def heights_cm(self) -> list[float]:
@@ -64,7 +60,7 @@ class SequenceFigures:
         return sum(event.seconds for event in self.stages.values()) if self.stages else None
 
 
-def gather(folder: Path, pictured: bool) -> SequenceFigures:
+def gather(folder: Path, name: str, pictured: bool) -> SequenceFigures:
     """Reads a sequence, with pictures of it if wanted; what is missing or damaged is said in the result, not raised."""
     record, audit = read_record(folder / layout.RECORD, SequenceRecord), read_record(folder / layout.AUDIT, AuditRecord)
     lacks = [said for said in (record, audit) if isinstance(said, str)]
@@ -80,8 +76,8 @@ def gather(folder: Path, pictured: bool) -> SequenceFigures:
         measured = measure(sequence, known.fps or USUAL_FPS)
         pictures = thumbnails(sequence) if pictured else ()
     except (SequenceFormatError, OSError) as error:
-        return SequenceFigures(folder, (*lacks, f"cannot be read: {error}"), known, checks, stages)
+        return SequenceFigures(folder, name, (*lacks, f"cannot be read: {error}"), known, checks, stages)
     flat = [str(number) for number, view in enumerate(sequence.views) if view.depth_m is None]
     if flat:
         lacks.append(f"there is no {layout.DEPTH} in view {', '.join(flat)}")
-    return SequenceFigures(folder, tuple(lacks), known, checks, stages, measured, pictures)
+    return SequenceFigures(folder, name, tuple(lacks), known, checks, stages, measured, pictures)

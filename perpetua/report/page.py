@@ -26,7 +26,10 @@ def write_report(root: Path, folders: list[Path], page: Path, say: Callable[[str
     Raises:
         InputError: the page cannot be written.
     """
-    figures = [gather(folder, pictured=number < MOST_PICTURED) for number, folder in enumerate(folders)]
+    figures = [
+        gather(folder, name, pictured=number < MOST_PICTURED)
+        for number, (folder, name) in enumerate(zip(folders, _names(root, folders), strict=True))
+    ]
     for one in figures:
         if one.measured is None:
             say(f"{one.folder}: {one.lacks[-1]}")
@@ -46,6 +49,14 @@ def write_report(root: Path, folders: list[Path], page: Path, say: Callable[[str
         stages=stage_rows(figures),
         most_pictured=MOST_PICTURED,
     )
+
+
+def _names(root: Path, folders: list[Path]) -> list[str]:
+    """Names of the folders; where several runs with the same names lie below the root, their ways there."""
+    names = [folder.resolve().name for folder in folders]
+    if len(set(names)) == len(names):
+        return names
+    return [folder.relative_to(root).as_posix() for folder in folders]
 
 
 def _known(value: float) -> float | None:

@@ -239,6 +239,15 @@ def test_page_says_what_is_there_and_what_is_missing(page: Path) -> None:
         assert said in text, said
 
 
+def test_sequences_of_several_runs_are_told_apart(tmp_path: Path) -> None:
+    for run in ("kitchens", "bedrooms"):
+        write_scene(tmp_path / run / "train" / "seed1-room0000")
+    done = CliRunner().invoke(main, ["report", str(tmp_path), "--out", str(tmp_path / "report.html")])
+    assert done.exit_code == 0, done.output
+    shown = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert all(f">{run}/train/seed1-room0000</td>" in shown for run in ("kitchens", "bedrooms"))
+
+
 def test_a_folder_without_sequences_is_an_error(tmp_path: Path) -> None:
     done = CliRunner().invoke(main, ["report", str(tmp_path)])
     assert done.exit_code == 2 and "holds no sequence" in done.output
