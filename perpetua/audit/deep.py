@@ -24,6 +24,8 @@ NOTHING = 0
 BEND_SHARE = 0.01
 # A ray has reached a point this far before it, metres: single precision may pick the next triangle at an edge.
 REACHED_M = 1e-4
+# A pixel shows a track's own surface where what its ray meets is this near to the plane of the track's triangle.
+SAME_DEPTH_M = 2e-3
 AROUND = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 
 
@@ -152,11 +154,11 @@ def verify_deep(
                 objects.add(f"{view}/foreground_mask.npy[{frame}", on_actor != foreground, clear)
             else:
                 objects.add(f"object index of view {view}[{frame}", owner != scene.object_index[number][frame], clear)
-            reached, shown = _evidence(files, table, rays, view, frame, owner)
+            seen = _evidence(files, table, rays, view, frame, owner, predicted_m)
             visible = np.asarray(files.of_view(int(view), "visibility.npy")[frame])
-            # Entries off the image count: calling them visible would be wrong. What no pixel around shows is hidden
-            # by the format's rule.
-            wrong = np.where(shown, visible != reached, visible)
+            # Entries off the image count: calling them visible would be wrong. What no pixel around shows, or none at
+            # the point's depth, is hidden by the format's rule.
+            wrong = np.where(seen.plain, visible != seen.reached, visible & ~(seen.reached & seen.shown))
             sight.add(f"{view}/visibility.npy[{frame}", wrong)
     return [
         check_of("depth by rays", [depth]),
@@ -201,6 +203,16 @@ def _neighbours(values: np.ndarray) -> Iterator[np.ndarray]:
             yield values[down : height - 2 + down, right : width - 2 + right]
 
 
+@dataclass(frozen=True)
+class _Evidence:
+    """Of each track: whether the ray from the camera reaches it on the image; whether rays of the four pixel centres
+    around meet its object, and whether they do so at its own surface's depth."""
+
+    reached: Bool[np.ndarray, " P"]
+    shown: Bool[np.ndarray, " P"]
+    plain: Bool[np.ndarray, " P"]
+
+
 def _evidence(
     files: SequenceFiles,
     table: dict[str, np.ndarray],
@@ -208,24 +220,27 @@ def _evidence(
     view: str,
     frame: int,
     owner: Int64[np.ndarray, "H W"],
-) -> tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]:
-    """Where the ray from the camera reaches a track on the image, and where rays of the four pixel centres around
-    meet its object."""
-    pose = files.of_view(int(view), "extrinsics_w2c.npy")[frame]
+    predicted_m: Float64[np.ndarray, "H W"],
+) -> _Evidence:
+    """What rays say of the tracks in one image; ``owner`` and ``predicted_m`` are those of ``predict_image``."""
+    camera = files.of_view(int(view), "intrinsics.npy"), files.of_view(int(view), "extrinsics_w2c.npy")[frame]
     point_m = np.asarray(files.arrays["tracks_xyz.npy"][frame], np.float64)
-    seen = project_to_pixels(files.of_view(int(view), "intrinsics.npy"), pose, point_m)
-    _, height, width = files.of_view(int(view), "depth.npy").shape
+    seen = project_to_pixels(*camera, point_m)
+    height, width = owner.shape
     with np.errstate(invalid="ignore"):
         inside = (seen[:, 2] > 0) & (np.abs(seen[:, 0] - (width - 1) / 2) < width / 2)
         inside &= np.abs(seen[:, 1] - (height - 1) / 2) < height / 2
     chosen = np.flatnonzero(inside)
-    eye_m = camera_centre_m(pose)
     object_index, face = table["object_index"][chosen], table["face"][chosen]
-    reached, shown = np.zeros(len(point_m), bool), np.zeros(len(point_m), bool)
-    reached[chosen] = rays.reach(frame, eye_m, point_m[chosen], object_index, face).reached
+    reached, shown, plain = (np.zeros(len(point_m), bool) for _ in range(3))
+    reached[chosen] = rays.reach(frame, camera_centre_m(camera[1]), point_m[chosen], object_index, face).reached
     corner = np.floor(seen[chosen, :2]).astype(np.int64)[:, None] + AROUND
     on_image = ((corner >= 0) & (corner < [width, height])).all(axis=2)
     column, row = np.clip(corner[..., 0], 0, width - 1), np.clip(corner[..., 1], 0, height - 1)
-    own_object = owner[row, column] == object_index[:, None]
-    shown[chosen] = (own_object & on_image).any(axis=1)
-    return reached, shown
+    own = on_image & (owner[row, column] == object_index[:, None])
+    shown[chosen] = own.any(axis=1)
+    triangle_m = np.asarray(files.arrays["surface_xyz.npy"][frame], np.float64)[chosen]
+    planes_m = [depth_of_planes(*camera, triangle_m, column[:, k], row[:, k]) for k in range(len(AROUND))]
+    off_m = np.abs(predicted_m[row, column] - np.stack(planes_m, axis=1))
+    plain[chosen] = (own & (off_m <= SAME_DEPTH_M)).any(axis=1)
+    return _Evidence(reached, shown, plain)
