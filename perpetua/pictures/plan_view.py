@@ -21,8 +21,9 @@ MOVING_M = 0.05
 HEAD_ROOM_M = 2.2
 # What spreads over more of the floor is the floor itself or the like, and would hide the rest.
 STRUCTURE_SHARE = 0.6
-# Footprints are convex, and walls go around corners: theirs would cover floor. The outline of the floor shows them.
-OUTLINED = ("wall", "skirting_board")
+# Footprints are convex: that of a wall around a corner would cover floor. Such walls the floor's outline shows.
+AROUND = ("wall", "skirting_board")
+THICKEST_WALL_M = 0.35
 PEOPLE = ("tab:red", "tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:pink")
 CAMERAS = ("black", "darkorange", "teal", "crimson", "slateblue", "olive")
 # What is drawn of the audit's curves: title, curve, whether of people.
@@ -66,14 +67,21 @@ def _draw_room(plan: Axes, record: dict[str, Any]) -> None:
         plan.add_patch(Polygon(outline, facecolor="#f4f1ea", edgecolor="black", linewidth=2.0, zorder=0))
     floor_m2 = float(np.prod(np.ptp(outline, axis=0))) if outline else np.inf
     things = [thing for thing in record.get("objects", []) if len(thing.get("footprint_m", [])) >= 3]
-    if outline:
-        things = [thing for thing in things if thing["category"] not in OUTLINED]
     for thing in sorted(things, key=lambda thing: thing["height_range_m"][1]):
         spread_m2 = float(np.prod(np.ptp(thing["footprint_m"], axis=0)))
         if thing["height_range_m"][0] > HEAD_ROOM_M or spread_m2 > STRUCTURE_SHARE * floor_m2:
             continue
+        if thing["category"] in AROUND and _width_m(thing["footprint_m"]) > THICKEST_WALL_M:
+            continue
         shade = "#dfe8d8" if thing["walkable"] else "#c9b79c"
         plan.add_patch(Polygon(thing["footprint_m"], facecolor=shade, edgecolor="#7a6a50", linewidth=0.6, zorder=1))
+
+
+def _width_m(footprint_m: list[list[float]]) -> float:
+    """The shorter side of the smallest rectangle around a footprint."""
+    import cv2
+
+    return float(min(cv2.minAreaRect(np.array(footprint_m, np.float32))[1]))
 
 
 def _draw_people(plan: Axes, sequence: Sequence, record: dict[str, Any]) -> None:

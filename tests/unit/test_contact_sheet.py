@@ -97,10 +97,12 @@ def test_plan_shows_furniture_routes_and_curves_that_are_recorded(sequence: Path
     with Image.open(tmp_path / "plan.png") as picture:
         assert picture.width == 1500
     # The hull of a wall around a corner would lie on the floor, as if people walked through it.
-    record["objects"].append(record["objects"][0] | {"category": "wall", "footprint_m": [[-3, -3], [3, -3], [-3, 3]]})
-    (copy / "sequence.json").write_text(json.dumps(record))
-    write_plan_view(read_sequence(copy), tmp_path / "plan.png")
-    assert _pixels_near(tmp_path / "plan.png", "#c9b79c") == furniture
+    around_m, straight_m = [[-3, -3], [3, -3], [-3, 3]], [[-2, 1], [2, 2], [2, 2.2], [-2, 1.2]]
+    for footprint_m, drawn in ((around_m, False), (straight_m, True)):
+        wall = record["objects"][0] | {"category": "wall", "footprint_m": footprint_m}
+        (copy / "sequence.json").write_text(json.dumps(record | {"objects": [*record["objects"], wall]}))
+        write_plan_view(read_sequence(copy), tmp_path / "plan.png")
+        assert (_pixels_near(tmp_path / "plan.png", "#c9b79c") > furniture) == drawn
 
 
 def _pixels_near(picture: Path, colour: str) -> int:
