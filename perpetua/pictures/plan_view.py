@@ -23,7 +23,7 @@ HEAD_ROOM_M = 2.2
 STRUCTURE_SHARE = 0.6
 # Footprints are convex: that of a wall around a corner would cover floor. Such walls the floor's outline shows.
 AROUND = ("wall", "skirting_board")
-THICKEST_WALL_M = 0.35
+THICKEST_WALL_M = 0.25
 PEOPLE = ("tab:red", "tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:pink")
 CAMERAS = ("black", "darkorange", "teal", "crimson", "slateblue", "olive")
 # What is drawn of the audit's curves: title, curve, whether of people.
