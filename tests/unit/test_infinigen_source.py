@@ -192,7 +192,7 @@ def test_a_hanging_generator_is_stopped(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 def test_missing_infinigen_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "infinigen2", None)
-    with pytest.raises(EnvironmentSetupError, match=r"perpetua\[infinigen\]"):
+    with pytest.raises(EnvironmentSetupError, match=r"pip install -e '\.\[infinigen\]'"):
         InfinigenRooms().draws(CONFIG)
 
 
