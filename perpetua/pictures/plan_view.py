@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float32, Float64
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -71,17 +71,17 @@ def _draw_room(plan: Axes, record: dict[str, Any]) -> None:
         spread_m2 = float(np.prod(np.ptp(thing["footprint_m"], axis=0)))
         if thing["height_range_m"][0] > HEAD_ROOM_M or spread_m2 > STRUCTURE_SHARE * floor_m2:
             continue
-        if thing["category"] in AROUND and _width_m(thing["footprint_m"]) > THICKEST_WALL_M:
+        if thing["category"] in AROUND and _width_m(np.array(thing["footprint_m"], np.float32)) > THICKEST_WALL_M:
             continue
         shade = "#dfe8d8" if thing["walkable"] else "#c9b79c"
         plan.add_patch(Polygon(thing["footprint_m"], facecolor=shade, edgecolor="#7a6a50", linewidth=0.6, zorder=1))
 
 
-def _width_m(footprint_m: list[list[float]]) -> float:
+def _width_m(footprint_m: Float32[np.ndarray, "N 2"]) -> float:
     """The shorter side of the smallest rectangle around a footprint."""
     import cv2
 
-    return float(min(cv2.minAreaRect(np.array(footprint_m, np.float32))[1]))
+    return float(min(cv2.minAreaRect(footprint_m)[1]))
 
 
 def _draw_people(plan: Axes, sequence: Sequence, record: dict[str, Any]) -> None:
