@@ -36,12 +36,15 @@ def write_animation(sequence: Sequence, fps: float, picture: Path) -> None:
     Raises:
         SequenceFormatError: an image of the sequence cannot be read.
     """
-    frames = [Image.fromarray(rgb) for rgb in _frames(sequence)]
-    size = (ANIMATION_WIDTH_PX, round(ANIMATION_WIDTH_PX * frames[0].height / frames[0].width))
-    first, *rest = [frame.resize(size, Image.Resampling.LANCZOS) for frame in frames]
+    first, *rest = [_reduced(rgb) for rgb in _frames(sequence)]
     length_ms = round(1000.0 / fps)
     repeated = {"save_all": True, "append_images": rest, "duration": length_ms, "loop": 0}
     first.save(picture, "WebP", quality=ANIMATION_QUALITY, minimize_size=True, **repeated)
+
+
+def _reduced(rgb: UInt8[np.ndarray, "H W 3"]) -> Image.Image:
+    size = (ANIMATION_WIDTH_PX, round(ANIMATION_WIDTH_PX * rgb.shape[0] / rgb.shape[1]))
+    return Image.fromarray(rgb).resize(size, Image.Resampling.LANCZOS)
 
 
 def _frames(sequence: Sequence) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
