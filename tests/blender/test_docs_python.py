@@ -20,7 +20,8 @@ def test_the_page_and_its_example_run(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     printed = done.stdout.splitlines()
-    assert printed[:5] == ["(6, 256, 3)", "(256, 4)", "(48, 64, 3)", "(6, 256)", "(6, 48, 64)"]
+    assert printed[0] == "Sequence('out/train/seed7-room0000': 6 frames, 4 views, 256 tracks)"
+    assert printed[1:6] == ["(6, 256, 3)", "(256, 4)", "(48, 64, 3)", "(6, 256)", "(6, 48, 64)"]
     assert printed[-1] == "(6, 256, 2)"
 
     example = next(command for command in commands() if "docs/examples/show_batch.py" in command.words)
