@@ -30,7 +30,7 @@ from perpetua.pipeline.cost import (
 )
 from perpetua.pipeline.events import OnEvent
 from perpetua.pipeline.free_memory import free_memory_mb
-from perpetua.pipeline.layout import LOG_FILE, OutputLayout, check_writable, open_run
+from perpetua.pipeline.layout import LOG_FILE, OutputLayout, check_writable, open_run, run_before
 from perpetua.pipeline.lease import hold
 from perpetua.pipeline.progress import Progress
 from perpetua.pipeline.runner import RoomRun, published_redraw
@@ -137,9 +137,14 @@ def open_folder(request: GenerateRequest, until: str = STAGES[-1].name) -> None:
         InputError: the folder was made with other settings, holds sequences of another version of the program, or
             cannot be written to.
     """
+    if not request.replace:
+        run_before(request.out, request.seed, request.config)
+        if until == STAGES[-1].name:
+            _refuse_outdated(request)
     open_run(request.out, request.seed, request.rooms, request.config, request.replace)
-    if request.replace or until != STAGES[-1].name:
-        return
+
+
+def _refuse_outdated(request: GenerateRequest) -> None:
     for room in request.rooms:
         layout = OutputLayout(request.out, request.config.export, request.seed, room)
         if layout.sequence_folder.is_dir() and published_redraw(layout, request.config) is None:

@@ -124,16 +124,28 @@ def open_run(out: Path, seed: int, rooms: range, config: Config, replace: bool) 
         raise InputError(f"cannot write to --out '{out}': {error.strerror}") from None
 
 
+def run_before(out: Path, seed: int, config: Config) -> RunRecord | None:
+    """The run that ``out`` holds, if any.
+
+    Raises:
+        InputError: it was made with another seed or config.
+    """
+    if not (out / RUN_FILE).exists():
+        return None
+    before = read_run(out)
+    differences = _differences(before, seed, config)
+    if differences:
+        raise InputError(
+            f"'{out}' was made with other settings ({differences}): choose another --out, or pass --replace to "
+            "make its sequences anew"
+        )
+    return before
+
+
 def _record_rooms(out: Path, seed: int, rooms: range, config: Config, replace: bool) -> RunRecord:
     wanted = set(rooms)
-    if (out / RUN_FILE).exists() and not replace:
-        before = read_run(out)
-        differences = _differences(before, seed, config)
-        if differences:
-            raise InputError(
-                f"'{out}' was made with other settings ({differences}): choose another --out, or pass --replace to "
-                "make its sequences anew"
-            )
+    before = None if replace else run_before(out, seed, config)
+    if before is not None:
         wanted |= set(before.rooms)
     record = RunRecord(seed, tuple(sorted(wanted)), config)
     write_json(out / RUN_FILE, {"seed": seed, "rooms": list(record.rooms), "config": config.model_dump(mode="json")})

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -196,6 +197,8 @@ def test_status_of_a_run_that_has_not_begun(tmp_path: Path) -> None:
 
 def test_sequences_of_another_version_are_named_and_kept(tmp_path: Path) -> None:
     from perpetua.config import load_config
+    from perpetua.errors import InputError
+    from perpetua.generation import GenerateRequest, open_folder
     from perpetua.pipeline.layout import OutputLayout
 
     (tmp_path / "run.json").write_text(json.dumps({"seed": 7, "rooms": [0, 1], "config": json.loads(_config_json())}))
@@ -209,6 +212,13 @@ def test_sequences_of_another_version_are_named_and_kept(tmp_path: Path) -> None
     done = _perpetua(*again, "--rooms", "2")
     assert done.exit_code == 2 and f"'{sequence}' is not what this version" in done.output.replace("\n", " ")
     assert [path.name for path in sequence.iterdir()] == ["audit.json"]
+    assert json.loads((tmp_path / "run.json").read_text())["rooms"] == [0, 1]
+    request = GenerateRequest(load_config("tiny"), 7, range(3), None, tmp_path, 1, "cpu", replace=False)
+    with pytest.raises(InputError, match="pass --replace"):
+        open_folder(request)
+    assert json.loads((tmp_path / "run.json").read_text())["rooms"] == [0, 1]
+    open_folder(replace(request, replace=True))
+    assert json.loads((tmp_path / "run.json").read_text())["rooms"] == [0, 1, 2]
 
 
 def test_assets_lists_licences() -> None:
