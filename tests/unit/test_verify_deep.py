@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planted_faults import Fault, assign, change
 from synthetic_scene import make_scene
 from synthetic_sequence import write_scene
 
@@ -18,7 +19,6 @@ from perpetua.audit.verify import verify_sequence
 
 FRAMES = 3
 DEEP = ("depth by rays", "objects by rays", "visibility by rays", "tracks on meshes")
-Fault = Callable[[Path], None]
 
 
 @pytest.fixture(scope="module")
@@ -84,21 +84,6 @@ def test_a_mask_that_shows_other_objects_is_caught(sequence: Path) -> None:
     assert _deep(sequence, with_index=True)["objects by rays"][0], "the rendered index is what is asked first"
 
 
-def _array(name: str, alter: Callable[[np.ndarray], Any]) -> Fault:
-    """Loads an array, alters it, in place or into what ``alter`` returns, and saves it."""
-
-    def plant(folder: Path) -> None:
-        array = np.load(folder / name)
-        altered = alter(array)
-        np.save(folder / name, array if altered is None else altered)
-
-    return plant
-
-
-def _set(name: str, index: Any, value: Any) -> Fault:
-    return _array(name, lambda array: array.__setitem__(index, value))
-
-
 def _record(name: str, alter: Callable[[list[Any]], Any]) -> Fault:
     """Alters one column of the record's table of tracks in place."""
 
@@ -143,22 +128,22 @@ def _first_corner_last(weights: list[list[float]]) -> None:
 # The files agree with one another in most of these: only the meshes tell.
 FAULTS: dict[str, tuple[Fault, str, str]] = {
     "depth two millimetres too near in one view": (
-        _array("2/depth.npy", _closer_by_two_millimetres), "depth by rays", "2/depth.npy"),
+        change("2/depth.npy", _closer_by_two_millimetres), "depth by rays", "2/depth.npy"),
     "depth in half precision": (
-        _array("0/depth.npy", lambda a: a.astype("f2").astype("f4")), "depth by rays", r"0/depth.npy\[0"),
-    "depth one frame late": (_array("0/depth.npy", lambda a: np.roll(a, 1, axis=0)), "depth by rays", "0/depth.npy"),
-    "a camera one centimetre aside": (_array("1/extrinsics_w2c.npy", _camera_aside), "depth by rays", "1/depth.npy"),
+        change("0/depth.npy", lambda a: a.astype("f2").astype("f4")), "depth by rays", r"0/depth.npy\[0"),
+    "depth one frame late": (change("0/depth.npy", lambda a: np.roll(a, 1, axis=0)), "depth by rays", "0/depth.npy"),
+    "a camera one centimetre aside": (change("1/extrinsics_w2c.npy", _camera_aside), "depth by rays", "1/depth.npy"),
     "a focal length half a percent too long": (
-        _array("1/intrinsics.npy", lambda a: a * np.array([1.005, 1.005, 1, 1], "f4")), "depth by rays", "1/depth.npy"),
+        change("1/intrinsics.npy", lambda a: a * np.array([1.005, 1.005, 1, 1], "f4")), "depth by rays", "1/depth.npy"),
     "a block called visible": (
-        _set("0/visibility.npy", (2, slice(None, 40)), True), "visibility by rays", r"0/visibility.npy\[2"),
-    "a block called hidden": (_array("0/visibility.npy", _hide_a_block), "visibility by rays", r"0/visibility.npy\[2"),
+        assign("0/visibility.npy", (2, slice(None, 40)), True), "visibility by rays", r"0/visibility.npy\[2"),
+    "a block called hidden": (change("0/visibility.npy", _hide_a_block), "visibility by rays", r"0/visibility.npy\[2"),
     "visibility one frame late": (
-        _array("1/visibility.npy", lambda a: np.roll(a, 1, axis=0)), "visibility by rays", "1/visibility.npy"),
+        change("1/visibility.npy", lambda a: np.roll(a, 1, axis=0)), "visibility by rays", "1/visibility.npy"),
     "tracks one frame late": (
-        _array("tracks_xyz.npy", lambda a: np.roll(a, 1, axis=0)), "tracks on meshes", r"tracks_xyz.npy\[\d, \d+\]"),
+        change("tracks_xyz.npy", lambda a: np.roll(a, 1, axis=0)), "tracks on meshes", r"tracks_xyz.npy\[\d, \d+\]"),
     "triangles one frame late": (
-        _array("surface_xyz.npy", lambda a: np.roll(a, 1, axis=0)), "tracks on meshes", "surface_xyz.npy"),
+        change("surface_xyz.npy", lambda a: np.roll(a, 1, axis=0)), "tracks on meshes", "surface_xyz.npy"),
     "the world scaled": (_scaled_world, "tracks on meshes", "m from face"),
     "one track on another object": (_record("object_index", lambda c: c.__setitem__(7, 3)), "tracks on meshes", ", 7"),
     "one track on an object that does not exist": (
