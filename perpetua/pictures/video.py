@@ -18,7 +18,7 @@ GAP_PX = 4
 # What a player draws as it was: near to lossless to the eye, and not much larger.
 QUALITY = "18"
 # A picture that a page loads at once: smaller, and lossy enough to be light.
-ANIMATION_WIDTH_PX, ANIMATION_QUALITY = 640, 52
+ANIMATION_WIDTH_PX, ANIMATION_QUALITY = 480, 40
 
 
 def write_video(sequence: Sequence, fps: float, video: Path) -> None:
