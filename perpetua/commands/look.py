@@ -47,11 +47,11 @@ def preview(
     """Draw pictures of a sequence into a folder, previews/<sequence> unless --out names another.
 
     \b
-    sheet    views by times, tracks with fading tails, hidden points as rings, depth, outlines of people
-    video    all views in step, with tracks, as MP4
-    plan     the room from above with the ways of people and cameras, and curves of how they move
-    depth    depth of all views, with a scale
-    objects  which object each pixel shows
+    sheet      views by times, tracks with fading tails, hidden points as rings, depth, outlines of people
+    video      all views in step, with tracks, as MP4
+    plan       the room from above with the ways of people and cameras, and curves of how they move
+    depth      depth of all views, with a scale
+    objects    which object each pixel shows
     animation  the video as an animated WebP for a web page, drawn only with --only animation
 
     With --rooms, rooms are made as generate makes them, in a folder that a later generate with the same settings

@@ -22,7 +22,7 @@ HEAD_ROOM_M = 2.2
 # What spreads over more of the floor is the floor itself or the like, and would hide the rest.
 STRUCTURE_SHARE = 0.6
 # Footprints are convex: that of a wall around a corner would cover floor. Such walls the floor's outline shows.
-AROUND = ("wall", "skirting_board")
+WALLS = ("wall", "skirting_board")
 THICKEST_WALL_M = 0.25
 PEOPLE = ("tab:red", "tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:pink")
 CAMERAS = ("black", "darkorange", "teal", "crimson", "slateblue", "olive")
@@ -71,7 +71,7 @@ def _draw_room(plan: Axes, record: dict[str, Any]) -> None:
         spread_m2 = float(np.prod(np.ptp(thing["footprint_m"], axis=0)))
         if thing["height_range_m"][0] > HEAD_ROOM_M or spread_m2 > STRUCTURE_SHARE * floor_m2:
             continue
-        if thing["category"] in AROUND and _width_m(np.array(thing["footprint_m"], np.float32)) > THICKEST_WALL_M:
+        if thing["category"] in WALLS and _width_m(np.array(thing["footprint_m"], np.float32)) > THICKEST_WALL_M:
             continue
         shade = "#dfe8d8" if thing["walkable"] else "#c9b79c"
         plan.add_patch(Polygon(thing["footprint_m"], facecolor=shade, edgecolor="#7a6a50", linewidth=0.6, zorder=1))
