@@ -12,15 +12,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from perpetua.actors.assembly import assemble_actors, draw_bodies, measured_skeletons
+from perpetua.actors.bodies.assembly import assemble_actors, draw_bodies, measured_skeletons
 from perpetua.actors.bodies.source import Body
-from perpetua.actors.config import ActorsConfig, MotionConfig
-from perpetua.actors.motion.actions import known_actions
-from perpetua.actors.motion.plan import make_motions
-from perpetua.actors.types import ActorMesh, Dwell, Route
+from perpetua.actors.config import ActorsConfig
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.raycast import Caster
-from perpetua.rooms.types import Material, Room, SceneObject
+from perpetua.motion.actions import known_actions
+from perpetua.motion.config import MotionConfig
+from perpetua.motion.plan import make_motions
+from perpetua.scene.actor import ActorMesh, Dwell, Route
+from perpetua.scene.room import Material, Room, SceneObject
 from perpetua.seeding import StageSeed
 
 FPS = 24.0

@@ -9,9 +9,9 @@ import time
 
 import numpy as np
 
-from perpetua.actors.assembly import assemble_actors, draw_bodies
+from perpetua.actors.bodies.assembly import assemble_actors, draw_bodies
 from perpetua.actors.config import ActorsConfig
-from perpetua.actors.types import BodyMotion
+from perpetua.scene.actor import BodyMotion
 from perpetua.seeding import StageSeed
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import trimesh
 from jaxtyping import Bool, Float64
 
-from perpetua.actors.types import ActorMesh
 from perpetua.audit.clearance import points_to_mesh_m, points_to_moving_mesh_m
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import TriMesh, join
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Room
 
 SUBSTEPS = 4
 BODY_POINTS = 30

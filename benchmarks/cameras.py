@@ -19,16 +19,16 @@ from pathlib import Path
 import numpy as np
 from camera_figures import clearances, figures, scene_mesh
 
-from perpetua.actors.types import ActorMesh
 from perpetua.cameras.config import CamerasConfig
+from perpetua.cameras.field import distance_at_m, polygon_distance_m, voxel_centres_m
 from perpetua.cameras.optimise import optimise_paths
 from perpetua.cameras.plan import CameraScene, Draft, camera_scene, draw_draft, make_paths, plan_cameras, pose_problem
-from perpetua.cameras.sdf import distance_at_m, polygon_distance_m, voxel_centres_m
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.transforms import look_at
 from perpetua.pipeline import codec
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
 SIZE_PX = 512

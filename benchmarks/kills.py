@@ -24,12 +24,14 @@ import numpy as np
 from rich.console import Console
 
 from perpetua.config import load_config
-from perpetua.files import file_sha256, read_json, write_json
-from perpetua.generation import GenerateRequest, run_generate
-from perpetua.pipeline.layout import LOG_FILE, WORK_FOLDER, OutputLayout
+from perpetua.formats.layout import LOG_FILE
+from perpetua.io.files import file_sha256, read_json, write_json
+from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout
+from perpetua.pipeline.room_work import GenerateRequest
 from perpetua.pipeline.stages import STAGE_NAMES
 from perpetua.pipeline.status import clean_work_area
 from perpetua.pipeline.store import output_hashes
+from perpetua.runs.generate import run_generate
 
 CONFIG = Path(__file__).parent / "minimal.yaml"
 PUBLISH = "publish"

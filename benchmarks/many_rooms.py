@@ -19,7 +19,7 @@ from statistics import mean
 import numpy as np
 import psutil
 
-from perpetua.pipeline.layout import LOG_FILE
+from perpetua.formats.layout import LOG_FILE
 
 CONFIG = Path(__file__).parent / "minimal.yaml"
 SAMPLE_EVERY_S = 2.0
@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def _run(options: argparse.Namespace, workers: int, out: Path) -> list[Sample]:
-    command = [sys.executable, "-c", "from perpetua.cli import main; main()", "generate", "--preset", "tiny"]
+    command = [sys.executable, "-c", "from perpetua.cli.app import main; main()", "generate", "--preset", "tiny"]
     command += ["--config", str(CONFIG), "--seed", str(options.seed), "--rooms", str(options.rooms)]
     command += ["--workers", str(workers), "--set", "work.keep=none", "--out", str(out)]
     options.out.mkdir(parents=True, exist_ok=True)

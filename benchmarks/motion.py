@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from perpetua.actors.penetration import make_floor
-from perpetua.actors.types import ActorMesh, BodyMotion
-from perpetua.files import read_json
+from perpetua.actors.checks.penetration import make_floor
 from perpetua.geometry.raycast import Caster
+from perpetua.io.files import read_json
 from perpetua.pipeline.codec import load
 from perpetua.pipeline.layout import read_run
+from perpetua.scene.actor import ActorMesh, BodyMotion
 
 # The underside of a sole is this thick.
 SOLE_M = 0.012

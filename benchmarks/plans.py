@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from perpetua.files import read_json
+from perpetua.io.files import read_json
 
 STAGES = ("10_room", "20_navigation", "30_routes", "40_motion", "50_actors", "60_cameras")
 FAST_M, FAST_FRAMES = 2.0, 24

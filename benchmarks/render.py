@@ -22,7 +22,7 @@ from render_error import BUDGET_PX, REFERENCE_SAMPLES, Error, measure_errors
 from render_look import Crop, compare_crops, render_pair
 from render_scenes import FRAMES, VIEWS, Scene, bake_scene, load_scene, spent_by_children
 
-from perpetua.files import read_json, write_json
+from perpetua.io.files import read_json, write_json
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from render_scenes import FRAMES, VIEWS, Image, Loop, Rendered, Scene, run_loop, spent_by_children
 
-from perpetua.files import read_json, write_json
+from perpetua.io.files import read_json, write_json
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
 

@@ -9,7 +9,7 @@ from PIL import Image as Pillow
 from render_scenes import Image, Loop, Scene, run_loop
 from scipy.ndimage import gaussian_filter
 
-from perpetua.files import read_json, write_json
+from perpetua.io.files import read_json, write_json
 from perpetua.rendering.config import RenderConfig
 
 # Luma of sRGB pictures (Rec. 601), and the constants of Wang, Bovik, Sheikh and Simoncelli 2004.

@@ -15,25 +15,25 @@ import psutil
 from jaxtyping import Float32, UInt8
 from PIL import Image as Pillow
 
-from perpetua.actors.types import ActorMesh
-from perpetua.blender import SCRIPT_FOLDER, Event, run_script
-from perpetua.cameras.types import CameraPath
 from perpetua.config import Config
-from perpetua.files import read_json, write_json
+from perpetua.io.files import read_json, write_json
+from perpetua.machine.blender import SCRIPT_FOLDER, Event, run_script
+from perpetua.machine.memory import PeakMemory
 from perpetua.pipeline import codec
 from perpetua.pipeline.layout import OutputLayout, read_run
-from perpetua.pipeline.memory import PeakMemory
 from perpetua.pipeline.runner import rejected_draws
 from perpetua.pipeline.stages import STAGES
 from perpetua.pipeline.store import StageFolder
 from perpetua.rendering.bake import bake_room
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.job import write_job
-from perpetua.rooms.build import REPORT_FILE
+from perpetua.rooms.acceptance.build import REPORT_FILE
 from perpetua.rooms.infinigen import SCRIPT, room_job
 from perpetua.rooms.script_output import read_room
 from perpetua.rooms.source import RoomWish
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
 PLAIN_LOOP = SCRIPT_FOLDER / "plain_loop.py"

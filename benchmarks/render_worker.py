@@ -27,17 +27,17 @@ from pathlib import Path
 
 import numpy as np
 
-from perpetua.actors.types import ActorMesh
-from perpetua.blender import script_command, script_environment
-from perpetua.cameras.types import CameraPath
-from perpetua.files import write_json
+from perpetua.io.files import write_json
+from perpetua.machine.blender import script_command, script_environment
 from perpetua.pipeline.codec import load
 from perpetua.rendering.bake import bake_room
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.job import EXPOSURE_FILE, PENDING_FILE, RENDER_SCRIPT, write_job
 from perpetua.rendering.render import render_views
-from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
+from perpetua.scene.room import Room
 
 # A sequence's length, over which starting Blender and metering are spread.
 SEQUENCE_FRAMES = 240

@@ -21,11 +21,11 @@ from pathlib import Path
 from typing import Any
 
 from perpetua.errors import PerpetuaError
-from perpetua.files import read_json, write_json
+from perpetua.io.files import read_json, write_json
+from perpetua.machine.memory import PeakMemory
+from perpetua.machine.scripts import scripts_sha256
 from perpetua.navigation.config import NavigationConfig
-from perpetua.pipeline.memory import PeakMemory
-from perpetua.rendering.scripts import scripts_sha256
-from perpetua.rooms.build import REPORT_FILE, build_room
+from perpetua.rooms.acceptance.build import REPORT_FILE, build_room
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.fingerprint import room_sha256
 from perpetua.seeding import StageSeed

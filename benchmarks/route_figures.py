@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.navigation.config import NavigationConfig
-from perpetua.rooms.types import Room
+from perpetua.scene.room import Room
 
 SUBSTEPS = 4
 # A body is over the floor where a ray from this height meets a walkable surface so near to the route's height.

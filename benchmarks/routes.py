@@ -18,22 +18,22 @@ import numpy as np
 from jaxtyping import Float64
 from route_figures import Motion, Surroundings
 
-from perpetua.actors.casting import cast_actors
-from perpetua.actors.config import ActorsConfig, RoutesConfig, RouteWeights
-from perpetua.actors.routes import plan_routes
-from perpetua.actors.routes.checks import TimedPaths
-from perpetua.actors.routes.draw import draw_walk, highest_speed_mps
-from perpetua.actors.routes.optimise import PlannedPaths, optimise_paths
-from perpetua.actors.routes.plan import set_stage
-from perpetua.actors.types import Route
+from perpetua.actors.config import ActorsConfig
 from perpetua.navigation.config import NavigationConfig
-from perpetua.navigation.drive import Walk
 from perpetua.navigation.grid import build_nav_grid
+from perpetua.navigation.time_parametrisation import Walk
 from perpetua.navigation.types import NavGrid
 from perpetua.pipeline.codec import load
-from perpetua.rooms.build import build_room
+from perpetua.rooms.acceptance.build import build_room
 from perpetua.rooms.config import RoomsConfig
-from perpetua.rooms.types import Room
+from perpetua.routes.casting import cast_actors
+from perpetua.routes.checks import TimedPaths
+from perpetua.routes.config import RoutesConfig, RouteWeights
+from perpetua.routes.draw import draw_walk, highest_speed_mps
+from perpetua.routes.optimise import PlannedPaths, optimise_paths
+from perpetua.routes.plan import plan_routes, set_stage
+from perpetua.scene.actor import Route
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
 FPS = 24.0
@@ -122,7 +122,7 @@ def check_table(scenes: list[Scene], frames: int) -> None:
     print("| room | violations | fast actors | mean m/s | top m/s | top m/s2 | redraws | CPU s |")
     print("|---|---|---|---|---|---|---|---|")
     counter = RedrawCounter()
-    planning = logging.getLogger("perpetua.actors.routes")
+    planning = logging.getLogger("perpetua.routes")
     planning.setLevel(logging.INFO)
     planning.addHandler(counter)
     plan_routes(scenes[0].room, scenes[0].grid, ActorsConfig(count=1), 2, FPS, scenes[0].seed)  # loads libraries

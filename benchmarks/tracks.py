@@ -20,11 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
-from perpetua.actors.types import ActorMesh
-from perpetua.cameras.types import CameraPath
 from perpetua.pipeline.codec import load
-from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.follow import TrackScene

@@ -8,8 +8,8 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from perpetua.formats.reader import Sequence, read_sequence
-from perpetua.pictures.drawing import BACKGROUND, FAINT, INK, Canvas, depth_colours, text_font
 from perpetua.pipeline.kept import kept_object_index
+from perpetua.report.pictures.drawing import BACKGROUND, FAINT, INK, Canvas, depth_colours, text_font
 
 REACH_PX, ENLARGE = 8, 9
 LABEL_PX, CAPTION_PX, GAP_PX = 250, 18, 8

@@ -2,7 +2,6 @@
 
 from perpetua.api import generate, sequences
 from perpetua.api import open_sequence as open
+from perpetua.machine.version import __version__
 
 __all__ = ["__version__", "generate", "open", "sequences"]
-
-__version__ = "0.1.0"

@@ -1,5 +1,5 @@
 """``python -m perpetua`` is ``perpetua``."""
 
-from perpetua.cli import main
+from perpetua.cli.app import main
 
 main(prog_name="perpetua")

@@ -59,8 +59,9 @@ def generate(
     from rich.console import Console
 
     from perpetua.config import load_config
-    from perpetua.generation import GenerateRequest, check_request, exit_code, make_rooms
     from perpetua.pipeline.layout import OutputLayout
+    from perpetua.pipeline.room_work import GenerateRequest
+    from perpetua.runs.generate import check_request, exit_code, make_rooms
 
     wanted = rooms if isinstance(rooms, range) else range(rooms)
     _check_numbers(seed, wanted, workers)

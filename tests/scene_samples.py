@@ -7,9 +7,9 @@ import numpy as np
 import trimesh
 
 from perpetua.navigation.config import NavigationConfig
-from perpetua.rooms.build import build_room
+from perpetua.rooms.acceptance.build import build_room
 from perpetua.rooms.config import RoomKind, RoomsConfig
-from perpetua.rooms.types import Room
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
 Y_UP_FROM_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import UInt16
 
-from perpetua.actors.types import ActorMesh
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.room import Room
 
 
 @dataclass(frozen=True)

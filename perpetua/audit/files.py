@@ -8,9 +8,9 @@ import numpy as np
 
 from perpetua.audit.report import Check
 from perpetua.errors import SequenceFormatError
-from perpetua.files import load_json
-from perpetua.formats.safe_pickle import read_byte_arrays
-from perpetua.npy import open_npy
+from perpetua.io.files import load_json
+from perpetua.io.npy import open_npy
+from perpetua.io.restricted_pickle import read_byte_arrays
 
 # Letters stand for lengths: F frames, E one less, P tracks, K objects, H and W a view's image. The first file that has
 # one settles it.

@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from perpetua.actors.config import RoutesConfig
-from perpetua.actors.types import ActorMesh, Route
 from perpetua.audit.clearance import FAR_M, pillars_to_mesh_m, points_to_mesh_m, points_to_moving_mesh_m
 from perpetua.audit.report import Check
 from perpetua.cameras.config import CamerasConfig
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import join
 from perpetua.geometry.pinhole import inside_image, project
 from perpetua.geometry.raycast import Caster
 from perpetua.geometry.transforms import invert_rigid, transform_points
 from perpetua.navigation.config import NavigationConfig
-from perpetua.rooms.types import Room
+from perpetua.routes.config import RoutesConfig
+from perpetua.scene.actor import ActorMesh, Route
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Room
 
 SUBSTEPS = 4
 # Rounding of stored positions and of the libraries that measure them.

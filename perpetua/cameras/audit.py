@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int32
 
-from perpetua.actors.types import ActorMesh
 from perpetua.cameras.config import CamerasConfig
 from perpetua.cameras.moving_mesh import MovingMesh
-from perpetua.cameras.types import CameraPath
 from perpetua.cameras.views import view_coverage
 from perpetua.geometry.raycast import Caster
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Room
 
 SUBSTEPS = 4
 SUBSTEP_M = 0.02

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32, Float64
 
-from perpetua.actors.types import ActorMesh
+from perpetua.scene.actor import ActorMesh
 
 # Heights of the body points as shares of the actor's height, from the head down.
 BODY_LEVELS = (0.93, 0.75, 0.55, 0.28, 0.05)

@@ -4,7 +4,7 @@ import numpy as np
 import trimesh
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
-from perpetua.actors.types import ActorMesh
+from perpetua.scene.actor import ActorMesh
 
 CELL_M = 0.12
 

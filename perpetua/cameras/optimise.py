@@ -11,8 +11,8 @@ from torch import Tensor
 from perpetua.cameras import losses
 from perpetua.cameras.bodies import ActorBounds
 from perpetua.cameras.config import CamerasConfig
-from perpetua.cameras.types import SignedDistanceField
-from perpetua.optimisation import deterministic_torch, minimise
+from perpetua.cameras.field import SignedDistanceField
+from perpetua.optimisation.adam import deterministic_torch, minimise
 
 DEGREE = 3
 CONTROL_S = 0.6

@@ -7,23 +7,23 @@ import numpy as np
 from jaxtyping import Bool, Float64
 from scipy import ndimage
 
-from perpetua.actors.types import ActorMesh
 from perpetua.cameras.audit import CameraAudit, audit_paths
 from perpetua.cameras.bodies import ActorBounds, actor_bounds, bounds_at
 from perpetua.cameras.config import CamerasConfig
+from perpetua.cameras.field import SignedDistanceField, signed_distance_field
 from perpetua.cameras.focus import FocusSchedule
 from perpetua.cameras.moving_mesh import MovingMesh
 from perpetua.cameras.optimise import Problem, Solution, optimise_paths, spline_basis
-from perpetua.cameras.sdf import signed_distance_field
+from perpetua.cameras.spec import ViewWish, draw_wishes, shown_points
 from perpetua.cameras.starts import StartScene, ViewStart, draw_starts
-from perpetua.cameras.types import CameraPath, SignedDistanceField
-from perpetua.cameras.wishes import ViewWish, draw_wishes, shown_points
 from perpetua.errors import CameraError
 from perpetua.geometry.mesh import join
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.raycast import Caster
 from perpetua.geometry.transforms import look_at
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
 # The losses look at the paths this often; splines with a control point every 0.6 s do not change faster.

@@ -14,10 +14,9 @@ from jaxtyping import Bool, Float64, Int64
 
 from perpetua.cameras.bodies import ActorBounds, bounds_at, capsule_distance_m
 from perpetua.cameras.config import CamerasConfig
+from perpetua.cameras.field import SignedDistanceField, distance_at_m, voxel_centres_m
 from perpetua.cameras.focus import FocusSchedule, draw_focus
-from perpetua.cameras.sdf import distance_at_m, voxel_centres_m
-from perpetua.cameras.types import SignedDistanceField
-from perpetua.cameras.wishes import ViewWish
+from perpetua.cameras.spec import ViewWish
 from perpetua.geometry.raycast import Caster
 from perpetua.geometry.transforms import look_at
 from perpetua.seeding import StageSeed

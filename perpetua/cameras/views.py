@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from perpetua.actors.types import ActorMesh
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.pinhole import inside_image, project
 from perpetua.geometry.raycast import Caster
 from perpetua.geometry.transforms import invert_rigid, transform_points
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
 
 POINTS = 16
 UPPER_BODY_LEVEL = 0.5

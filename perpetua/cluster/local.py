@@ -5,10 +5,11 @@ import time
 from collections.abc import Sequence
 from types import FrameType
 
-from perpetua.cluster.outcome import RoomWork, work_on
+from perpetua.cluster.outcome import work_on
 from perpetua.cluster.pool import LOOK_EVERY_S, Pool
 from perpetua.pipeline.events import OnEvent
 from perpetua.pipeline.lease import LeaseWatch
+from perpetua.pipeline.room_work import RoomWork
 
 
 def run_rooms(rooms: Sequence[int], workers: int, work: RoomWork, on_event: OnEvent) -> dict[int, str]:

@@ -1,7 +1,6 @@
 """One room's work, wherever it runs: what came of it, and its own log."""
 
 import logging
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,26 +10,11 @@ from typing import Literal
 from perpetua.errors import PerpetuaError
 from perpetua.pipeline.events import Event, OnEvent, log_line
 from perpetua.pipeline.lease import LeaseHeldError, LeaseLostError
+from perpetua.pipeline.room_work import RoomWork
 
 logger = logging.getLogger("perpetua")
 
-RoomJob = Callable[[int, OnEvent], None]
-RoomFolder = Callable[[int], Path]
-
 ROOM_LOG = "log.jsonl"
-
-
-@dataclass(frozen=True)
-class RoomWork:
-    """What is done with each room. All must be picklable.
-
-    ``job(room, on_event)`` does the work, ``folder(room)`` is where it is done, under a lease; ``memory_mb`` is what
-    the work on one room may need at most, with all processes that it starts.
-    """
-
-    job: RoomJob
-    folder: RoomFolder
-    memory_mb: float
 
 
 @dataclass(frozen=True)

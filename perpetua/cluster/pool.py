@@ -19,12 +19,13 @@ from multiprocessing.process import BaseProcess
 
 import psutil
 
-from perpetua.cluster.outcome import Outcome, RoomWork, work_on
+from perpetua.cluster.outcome import Outcome, work_on
+from perpetua.machine.devices import share_machine
+from perpetua.machine.free_memory import free_memory_mb
+from perpetua.machine.memory import tree_memory_mb
 from perpetua.pipeline.events import Event, OnEvent
-from perpetua.pipeline.free_memory import free_memory_mb
 from perpetua.pipeline.lease import LeaseWatch
-from perpetua.pipeline.memory import tree_memory_mb
-from perpetua.rendering.devices import share_machine
+from perpetua.pipeline.room_work import RoomWork
 
 PR_SET_PDEATHSIG = 1
 LOOK_EVERY_S = 1.0

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from perpetua.errors import EnvironmentSetupError, InputError, PerpetuaError
-from perpetua.files import read_json, write_json
+from perpetua.io.files import read_json, write_json
 
 # Slurm's default of MaxArraySize, for plans where there is no Slurm to ask.
 DEFAULT_MOST_TASKS = 1001

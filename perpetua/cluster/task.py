@@ -10,13 +10,13 @@ from perpetua.cluster.local import raise_on_sigterm
 from perpetua.cluster.plan import LAST_OF_GEOMETRY, has_geometry
 from perpetua.cluster.pool import Pool
 from perpetua.errors import PerpetuaError
-from perpetua.files import read_json
-from perpetua.generation import GenerateRequest, note_failures, room_work
+from perpetua.io.files import read_json
+from perpetua.machine.system_libraries import require_libraries
 from perpetua.pipeline.events import Event
 from perpetua.pipeline.layout import OutputLayout, RunRecord
 from perpetua.pipeline.progress import describe
+from perpetua.pipeline.room_work import GenerateRequest, note_failures, room_work
 from perpetua.pipeline.stages import STAGE_NAMES
-from perpetua.system_libraries import require_libraries
 
 # Attempts in a row in which nothing was finished, not even a frame, after which a task is not requeued again.
 MOST_IDLE_ATTEMPTS = 3

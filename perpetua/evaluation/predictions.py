@@ -31,7 +31,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int64
 
 from perpetua.errors import InputError
-from perpetua.npz import ArchiveError, open_npz
+from perpetua.io.npz import ArchiveError, open_npz
 
 CAMERA, WORLD, VISIBILITY, INDEX = "tracks_xyz_camera", "tracks_xyz_world", "visibility", "track_index"
 GEOMETRY_PIXELS, GEOMETRY = "geometry_pixels_xytv", "geometry_xyz_world"

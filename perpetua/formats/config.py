@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 from pydantic import Field, field_validator
 
-from perpetua.config_base import Section
+from perpetua.io.section import Section
 from perpetua.seeding import stream
 
 Output = Literal["object_index", "normals", "flow", "scene_flow", "view_flow"]

@@ -39,9 +39,9 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from perpetua.errors import InputError, SequenceFormatError
-from perpetua.files import write_json
-from perpetua.formats.source import EXPORTERS, HALF_PIXEL_PX, ExportSource, image_size_px
+from perpetua.formats.source import HALF_PIXEL_PX, ExportSource, image_size_px
 from perpetua.geometry.transforms import invert_rigid
+from perpetua.io.files import write_json
 
 SENSOR_WIDTH_MM = 36.0
 OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0])
@@ -50,7 +50,6 @@ _CENTRE_PX = 1e-3
 _SQUARE = 1e-5
 
 
-@EXPORTERS.register("kubric")
 class Kubric:
     """One scene folder; equal sequences give equal bytes."""
 

@@ -10,7 +10,7 @@ from perpetua.formats import layout
 from perpetua.formats.frame_file import FrameFile
 from perpetua.labels.motion import PixelFlow, flow, normals, scene_flow_m
 from perpetua.labels.pixels import LabelledScene, PixelSurfaces
-from perpetua.rendering.types import FilmedScene
+from perpetua.scene.filmed import FilmedScene
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,8 @@ DEPTH = "depth.npy"
 FOREGROUND = "foreground_mask.npy"
 RECORD = "sequence.json"
 AUDIT = "audit.json"
+# Of the run, in the folder that holds the splits: one JSON object per line.
+LOG_FILE = "log.jsonl"
 SURFACE = "surface_xyz.npy"
 POSES = "object_poses.npy"
 BOXES = "object_boxes.npy"

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Float32, Float64
 
-from perpetua.actors.types import ActorMesh, BodyMotion
 from perpetua.geometry.transforms import invert_rigid, transform_points
-from perpetua.rendering.types import FilmedScene
+from perpetua.scene.actor import ActorMesh, BodyMotion
+from perpetua.scene.filmed import FilmedScene
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8, UInt16
 
 from perpetua.errors import SequenceFormatError
-from perpetua.files import load_json
 from perpetua.formats import layout
-from perpetua.formats.safe_pickle import read_byte_arrays
-from perpetua.npy import open_npy
+from perpetua.io.files import load_json
+from perpetua.io.npy import open_npy
+from perpetua.io.restricted_pickle import read_byte_arrays
 
 
 @dataclass(frozen=True, repr=False)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt8
 
-from perpetua.actors.types import ActorMesh, ActorPart
 from perpetua.formats.source import ExportSource, KeptMeshes
+from perpetua.scene.actor import ActorMesh, ActorPart
 
 # What stands between an eye outside and the room; the viewer starts without it.
 SHELL = frozenset({"ceiling", "wall"})

@@ -28,7 +28,7 @@ from jaxtyping import Float64, Int64, UInt8
 from perpetua.errors import EnvironmentSetupError
 from perpetua.formats.rerun_layout import viewer_layout
 from perpetua.formats.rerun_meshes import entity_name, still_meshes, vertex_colours, vertex_normals
-from perpetua.formats.source import EXPORTERS, HALF_PIXEL_PX, ExportSource, KeptMeshes, image_size_px
+from perpetua.formats.source import HALF_PIXEL_PX, ExportSource, KeptMeshes, image_size_px
 from perpetua.geometry.transforms import invert_rigid
 
 TRAIL_FRAMES = 12
@@ -37,7 +37,6 @@ _MILLIMETRES_PER_METRE = 1000.0
 _FARTHEST_MM = 65535.0
 
 
-@EXPORTERS.register("rerun")
 class RerunRecording:
     """A recording for Rerun's viewer."""
 

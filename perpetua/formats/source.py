@@ -10,12 +10,12 @@ from typing import Any, Protocol
 import numpy as np
 from jaxtyping import Float32, Float64, Int64, UInt16
 
-from perpetua.actors.types import ActorMesh
 from perpetua.errors import SequenceFormatError
 from perpetua.formats.reader import Sequence, SequenceView
 from perpetua.geometry.transforms import transform_points
 from perpetua.registry import Registry
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.room import Room
 
 PERSON = "person"
 # Corner of the top-left pixel as origin, where ours is its centre: what other readers add to our pixels.
@@ -141,4 +141,12 @@ class Exporter(Protocol):
         ...
 
 
-EXPORTERS: Registry[type[Exporter]] = Registry("export format")
+EXPORTERS: Registry[type[Exporter]] = Registry(
+    "export format",
+    "perpetua.exporters",
+    {
+        "kubric": "perpetua.formats.kubric:Kubric",
+        "rerun": "perpetua.formats.rerun_recording:RerunRecording",
+        "tapvid3d": "perpetua.formats.tapvid3d:Tapvid3d",
+    },
+)

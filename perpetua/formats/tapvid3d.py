@@ -20,12 +20,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from perpetua.formats.source import EXPORTERS, HALF_PIXEL_PX, ExportSource
+from perpetua.formats.source import HALF_PIXEL_PX, ExportSource
 from perpetua.tracks.queries import draw_queries
 from perpetua.tracks.types import ViewTracks
 
 
-@EXPORTERS.register("tapvid3d")
 class Tapvid3d:
     """Single views in TAPVid-3D's layout; equal sequences give equal bytes."""
 

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64
 
-from perpetua.cameras.types import CameraPath
-from perpetua.files import file_sha256
 from perpetua.formats import layout
 from perpetua.formats.frame_file import FrameFile
 from perpetua.formats.label_files import write_labels
 from perpetua.formats.poses import object_poses
 from perpetua.geometry.transforms import invert_rigid
-from perpetua.rendering.types import FilmedScene, RenderedView
+from perpetua.io.files import file_sha256
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import FilmedScene, RenderedView
 from perpetua.tracks.motion import MOVING_M, is_fast, travel_m
 from perpetua.tracks.surface import SceneMeshes, SurfacePoints, bind
 from perpetua.tracks.types import PointTracks, SequenceTracks

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float64, Int64
 
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.transforms import invert_rigid, transform_points
-from perpetua.rendering.types import FilmedScene
+from perpetua.scene.filmed import FilmedScene
 from perpetua.tracks.pixel_hits import hit_pixels
 from perpetua.tracks.placed import as_exported
 from perpetua.tracks.sight import SceneSight

@@ -10,7 +10,7 @@ from perpetua.errors import NavigationError
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.raster import Raster, inside_polygon, touched_cells
 from perpetua.navigation.types import NavGrid
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.scene.room import Room, SceneObject
 
 # Obstacles are rasterised on cells of at most this side, so that the grid's cells need not be fine.
 FINE_CELL_M = 0.02

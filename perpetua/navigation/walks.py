@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float64
 from scipy.spatial import KDTree
 
-from perpetua.navigation.drive import SMOOTHING_S, TRUNCATE, Stop, Stretch, Walk, drive, turn_s
 from perpetua.navigation.floor import WalkableFloor, Ways
+from perpetua.navigation.time_parametrisation import SMOOTHING_S, TRUNCATE, Stop, Stretch, Walk, drive, turn_s
 from perpetua.navigation.types import Spot
 
 CANDIDATES = 24

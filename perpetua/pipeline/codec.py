@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from perpetua.actors.types import ActorMesh, ActorPart, BodyMotion, Dwell, Route
-from perpetua.cameras.types import CameraPath
 from perpetua.errors import PerpetuaError
-from perpetua.files import load_json
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
+from perpetua.io.files import load_json
 from perpetua.navigation.types import NavGrid
-from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import AreaLight, Material, Room, SceneObject, Sky
+from perpetua.scene.actor import ActorMesh, ActorPart, BodyMotion, Dwell, Route
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
+from perpetua.scene.room import AreaLight, Material, Room, SceneObject, Sky
 from perpetua.tracks.types import PointTracks, SequenceTracks, SightReport, ViewTracks
 
 VALUE_FILE = "value.json"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from perpetua.config import Config
 from perpetua.errors import InputError
-from perpetua.pipeline.troubles import DiskError
+from perpetua.pipeline.os_errors import DiskError
 
 # Measured on finished rooms and rounded up: a pixel of a JPEG at quality 95, a vertex of a dressed body at one frame,
 # a body's textures and faces, a room's meshes and .blend, and a texel of its three baked passes.

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt16
 
-from perpetua.actors.types import Route
 from perpetua.audit.deep_scene import DeepScene
 from perpetua.errors import InputError
 from perpetua.formats.reader import require_sequence
@@ -17,7 +16,8 @@ from perpetua.pipeline.layout import WORK_FOLDER, RunRecord, read_run
 from perpetua.pipeline.stages import STAGES
 from perpetua.pipeline.store import StageFolder
 from perpetua.pipeline.work_area import SCENE_STAGES
-from perpetua.rendering.types import FilmedScene
+from perpetua.scene.actor import Route
+from perpetua.scene.filmed import FilmedScene
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,13 @@ from pathlib import Path
 
 from perpetua.config import Config
 from perpetua.errors import InputError
-from perpetua.files import load_json, write_json
 from perpetua.formats.config import ExportConfig, split_of_room
 from perpetua.formats.layout import AUDIT
+from perpetua.io.files import load_json, write_json
 from perpetua.pipeline.lease import hold_when_free
 
 WORK_FOLDER = ".work"
 RUN_FILE = "run.json"
-LOG_FILE = "log.jsonl"
 
 
 def sequence_name(seed: int, room: int) -> str:

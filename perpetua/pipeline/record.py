@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-import perpetua
-from perpetua.actors.types import ActorMesh, Route
 from perpetua.config import Config
 from perpetua.geometry.mesh import TriMesh
+from perpetua.machine.version import __version__
 from perpetua.pipeline.store import library_versions
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.scene.actor import ActorMesh, Route
+from perpetua.scene.room import Room, SceneObject
 from perpetua.seeding import StageSeed
 
 LICENCES = {
@@ -41,7 +41,7 @@ def sequence_record(
         for route, actor in zip(routes, actors, strict=True)
     ]
     return {
-        "perpetua": perpetua.__version__,
+        "perpetua": __version__,
         "seed": seed.seed,
         "room": seed.room,
         "room_name": room.name,

@@ -11,17 +11,17 @@ from typing import Any
 
 from perpetua.config import Config
 from perpetua.errors import ActorError, CameraError, PerpetuaError, RouteError, TrackError
-from perpetua.files import read_json, write_json
 from perpetua.formats.layout import AUDIT as AUDIT_FILE
+from perpetua.io.files import read_json, write_json
+from perpetua.machine.memory import PeakMemory, give_back
+from perpetua.machine.scripts import scripts_sha256
 from perpetua.pipeline import codec, store
 from perpetua.pipeline.events import Event, OnEvent
 from perpetua.pipeline.layout import OutputLayout
 from perpetua.pipeline.lease import Lease, hold
-from perpetua.pipeline.memory import PeakMemory, give_back
+from perpetua.pipeline.os_errors import explained
 from perpetua.pipeline.stages import SEQUENCE_FOLDER, STAGES, Stage, StageContext
-from perpetua.pipeline.troubles import explained
 from perpetua.pipeline.work_area import free_work
-from perpetua.rendering.scripts import scripts_sha256
 from perpetua.seeding import StageSeed
 
 # Errors that another draw of the routes, or of the room, may not meet.

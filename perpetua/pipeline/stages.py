@@ -6,36 +6,36 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from perpetua.actors.assembly import assemble_actors, draw_bodies, measured_skeletons
+from perpetua.actors.bodies.assembly import assemble_actors, draw_bodies, measured_skeletons
 from perpetua.actors.bodies.source import Body
 from perpetua.actors.bodies.user_files import body_listing
-from perpetua.actors.casting import action_descriptions
+from perpetua.actors.checks.validation import validate_actors
 from perpetua.actors.config import ActorsConfig
-from perpetua.actors.motion.clips import clip_listing
-from perpetua.actors.motion.plan import make_motions
-from perpetua.actors.routes import plan_routes
-from perpetua.actors.types import ActorMesh, BodyMotion, Route
-from perpetua.actors.validation import validate_actors
 from perpetua.audit.motion_audit import MotionLimits, audit_motion
 from perpetua.audit.verify import verify_sequence
 from perpetua.cameras.plan import CameraPlan, plan_cameras
-from perpetua.cameras.types import CameraPath
 from perpetua.config import Config
+from perpetua.config.run import RedrawConfig
 from perpetua.errors import AuditError, CameraError
-from perpetua.files import read_json, write_json
 from perpetua.formats import layout
 from perpetua.formats.tapvid_mv import write_sequence
+from perpetua.io.files import read_json, write_json
+from perpetua.motion.plan import make_motions
+from perpetua.motion.recorded.clips import clip_listing
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
-from perpetua.pipeline.config import RedrawConfig
 from perpetua.pipeline.record import sequence_record
 from perpetua.rendering.bake import BAKE_SCRIPT
 from perpetua.rendering.config import PROCESS_SETTINGS
 from perpetua.rendering.render import BAKED_FOLDER, RENDER_SCRIPT, render_views
-from perpetua.rendering.types import FilmedScene, RenderedView
-from perpetua.rooms.build import build_room
-from perpetua.rooms.scene_file_checks import scene_digests
-from perpetua.rooms.types import Room
+from perpetua.rooms.acceptance.build import build_room
+from perpetua.rooms.files.checks import scene_digests
+from perpetua.routes.casting import action_descriptions
+from perpetua.routes.plan import plan_routes
+from perpetua.scene.actor import ActorMesh, BodyMotion, Route
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import FilmedScene, RenderedView
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 from perpetua.tracks.follow import TrackScene
 from perpetua.tracks.make import make_tracks

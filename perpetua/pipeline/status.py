@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.table import Table
 
-from perpetua.files import read_json
+from perpetua.io.files import read_json
 from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout, RunRecord, read_run
 from perpetua.pipeline.lease import LeaseWatch, read_lease
 from perpetua.pipeline.runner import published_redraw, rejected_draws, stage_keys

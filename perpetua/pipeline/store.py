@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from perpetua.files import file_sha256, load_json
+from perpetua.io.files import file_sha256, load_json
 
 MANIFEST_FILE = "manifest.json"
 KEY_FILE = "key"

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from perpetua.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
-from perpetua.cameras.types import CameraPath
 from perpetua.errors import RenderError
-from perpetua.files import file_sha256, write_json
+from perpetua.io.files import file_sha256, write_json
+from perpetua.machine.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
+from perpetua.machine.scripts import scripts_sha256
 from perpetua.rendering.closeness import Closeness, measure_closeness
 from perpetua.rendering.config import RenderConfig
-from perpetua.rendering.scripts import scripts_sha256
-from perpetua.rooms.types import Room
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Room
 
 logger = logging.getLogger(__name__)
 

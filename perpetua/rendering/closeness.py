@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt16
 
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import join
 from perpetua.geometry.pinhole import Intrinsics, unproject
 from perpetua.geometry.raycast import Caster
-from perpetua.rooms.types import Room
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Room
 
 # Poses per camera and rays per image side: 4 cameras look at a room along 400,000 rays, in about 2 s.
 MAX_POSES = 48

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from perpetua.config_base import Section
+from perpetua.io.section import Section
 from perpetua.rendering.sensor import SensorConfig
 
 # Settings of how the work is done, which do not change what comes out.

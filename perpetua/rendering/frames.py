@@ -10,9 +10,9 @@ import numpy as np
 import OpenEXR
 from jaxtyping import Float32, UInt16
 
-from perpetua.cameras.types import CameraPath
 from perpetua.errors import RenderError
-from perpetua.rendering.types import RenderedView
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
 
 # Depth at and beyond this is no surface (Blender writes 1e10 for the background).
 BACKGROUND_DEPTH_M = 1e9

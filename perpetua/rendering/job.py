@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Shaped
 
-from perpetua.actors.types import ActorMesh
-from perpetua.blender import SCRIPT_FOLDER
-from perpetua.cameras.types import CameraPath
-from perpetua.files import file_sha256, write_json
+from perpetua.io.files import file_sha256, write_json
+from perpetua.machine.blender import SCRIPT_FOLDER
+from perpetua.machine.devices import cpu_threads, machine_share
+from perpetua.machine.scripts import scripts_sha256
 from perpetua.rendering.config import PROCESS_SETTINGS, RenderConfig
-from perpetua.rendering.devices import cpu_threads, machine_share
-from perpetua.rendering.scripts import scripts_sha256
 from perpetua.rendering.sensor import noise_seed, view_gains
-from perpetua.rooms.types import AreaLight, Material, Room, SceneObject
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import AreaLight, Material, Room, SceneObject
 from perpetua.seeding import StageSeed
 
 RENDER_SCRIPT = SCRIPT_FOLDER / "render_frames.py"

@@ -6,18 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
-from perpetua.actors.types import ActorMesh
-from perpetua.blender import BlenderError, Event, run_script
-from perpetua.cameras.types import CameraPath
 from perpetua.errors import RenderError
-from perpetua.files import read_json, write_json
+from perpetua.io.files import read_json, write_json
+from perpetua.machine.blender import BlenderError, Event, run_script
+from perpetua.machine.devices import DEVICES
 from perpetua.rendering.bake import bake_room
 from perpetua.rendering.config import RenderConfig
-from perpetua.rendering.devices import DEVICES
 from perpetua.rendering.frames import DamagedFrameError, assemble_view, drop_damaged
 from perpetua.rendering.job import FRAME_FOLDER, NO_SEED, PENDING_FILE, RENDER_SCRIPT, write_job
-from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
 logger = logging.getLogger(__name__)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float64
 from pydantic import Field
 
-from perpetua.config_base import Section
+from perpetua.io.section import Section
 from perpetua.seeding import StageSeed
 
 # Sines that exposure drifts in.

@@ -9,7 +9,6 @@ from statistics import mean, median
 
 import numpy as np
 
-from perpetua.pipeline.stages import STAGE_NAMES
 from perpetua.report import scales
 from perpetua.report.charts import Chart, histogram, named, shares, tally
 from perpetua.report.gather import SequenceFigures
@@ -153,14 +152,13 @@ def check_rows(figures: list[SequenceFigures]) -> list[CheckRow]:
 
 
 def stage_rows(figures: list[SequenceFigures]) -> list[StageRow]:
-    """What each stage cost, in the order of the pipeline."""
+    """What each stage cost, in the order in which stages were first finished."""
     known = [one.stages for one in figures if one.stages]
     total = sum(event.seconds for stages in known for event in stages.values()) or 1.0
     rows = []
-    for name in STAGE_NAMES:
+    for name in dict.fromkeys(name for stages in known for name in stages):
         events = [stages[name] for stages in known if name in stages]
-        if events:
-            seconds = [event.seconds for event in events]
-            memory_mb = max(event.peak_memory_mb for event in events)
-            rows.append(StageRow(name, median(seconds), max(seconds), memory_mb, len(events), sum(seconds) / total))
+        seconds = [event.seconds for event in events]
+        memory_mb = max(event.peak_memory_mb for event in events)
+        rows.append(StageRow(name, median(seconds), max(seconds), memory_mb, len(events), sum(seconds) / total))
     return rows

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from perpetua.errors import SequenceFormatError
 from perpetua.formats import layout
+from perpetua.formats.layout import LOG_FILE
 from perpetua.formats.reader import read_sequence
-from perpetua.pipeline.layout import LOG_FILE
 from perpetua.report.measure import Measured, measure
 from perpetua.report.records import (
     AuditRecord,

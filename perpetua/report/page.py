@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-import perpetua
-from perpetua.html_page import html_environment, write_html
+from perpetua.io.html_page import html_environment, write_html
+from perpetua.machine.version import __version__
 from perpetua.report.dataset import charts, check_rows, compare, stage_rows
 from perpetua.report.gather import gather
 
@@ -40,7 +40,7 @@ def write_report(root: Path, folders: list[Path], page: Path, say: Callable[[str
         TEMPLATE,
         page,
         title=root.resolve().name,
-        version=perpetua.__version__,
+        version=__version__,
         sequences=figures,
         readable=sum(one.measured is not None for one in figures),
         comparison=compare(figures),

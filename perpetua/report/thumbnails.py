@@ -6,7 +6,7 @@ import io
 from PIL import Image
 
 from perpetua.formats.reader import Sequence
-from perpetua.pictures.track_marks import choose_tracks, draw_tracks
+from perpetua.report.pictures.track_marks import choose_tracks, draw_tracks
 
 WIDTH_PX = 240
 JPEG_QUALITY = 80

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float64
 from perpetua.geometry.mesh import TriMesh, face_areas_m2, join
 from perpetua.geometry.raycast import Caster
 from perpetua.navigation.raster import inside_polygon
-from perpetua.rooms.types import Room
+from perpetua.scene.room import Room
 
 SAMPLES = 20_000
 FAR_M = 0.02

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from perpetua.config_base import Section
+from perpetua.io.section import Section
 
 RoomKind = Literal["bathroom", "bedroom", "diningroom", "kitchen", "livingroom"]
 Daytime = Literal["day", "evening", "night"]

@@ -4,7 +4,7 @@ import hashlib
 
 import numpy as np
 
-from perpetua.rooms.types import Room
+from perpetua.scene.room import Room
 
 
 def room_sha256(room: Room) -> str:

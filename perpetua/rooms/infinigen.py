@@ -9,16 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from perpetua.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.errors import EnvironmentSetupError
-from perpetua.files import write_json
 from perpetua.geometry.mesh import TriMesh
-from perpetua.rooms.acceptance import RoomRejected
+from perpetua.io.files import write_json
+from perpetua.machine.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.rooms.collider_gap import ColliderGap, collider_gap
 from perpetua.rooms.config import RoomKind, RoomsConfig
 from perpetua.rooms.script_output import read_room
-from perpetua.rooms.source import ROOM_SOURCES, RoomWish
-from perpetua.rooms.types import Room
+from perpetua.rooms.source import RoomRejected, RoomWish
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
 SCRIPT = SCRIPT_FOLDER / "infinigen_room.py"
@@ -28,7 +27,6 @@ COLLIDER_GAP_FILE = "collider_gap.json"
 SIDE_SCALE: dict[RoomKind, float] = {"bathroom": 0.8}
 
 
-@ROOM_SOURCES.register("infinigen")
 class InfinigenRooms:
     """Furnished rooms by Infinigen Indoors 2 (https://infinigen.org).
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from perpetua.geometry.mesh import TriMesh
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.scene.room import Room, SceneObject
 
 
 def read_room(folder: Path, name: str, blend_path: Path) -> Room:

@@ -8,7 +8,7 @@ import numpy as np
 
 from perpetua.registry import Registry
 from perpetua.rooms.config import Daytime, RoomKind, RoomsConfig
-from perpetua.rooms.types import Room
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
 # By day lamps are on in this share of rooms.
@@ -36,6 +36,14 @@ def draw_wish(kind: RoomKind, config: RoomsConfig, rng: np.random.Generator) -> 
     shining = daytime != "day" or bool(rng.uniform() < LAMPS_BY_DAY)
     lamps_on = shining if config.lamps == "drawn" else config.lamps == "on"
     return RoomWish(kind, (round(float(x_m), 2), round(float(y_m), 2), round(float(height_m), 2)), daytime, lamps_on)
+
+
+class RoomRejected(Exception):
+    """This draw of a room is no use, and another may be; ``rule`` is the short name under which it is counted."""
+
+    def __init__(self, rule: str, message: str) -> None:
+        super().__init__(message)
+        self.rule = rule
 
 
 class RoomSource(Protocol):
@@ -66,4 +74,12 @@ class RoomSource(Protocol):
         ...
 
 
-ROOM_SOURCES: Registry[type[RoomSource]] = Registry("rooms.source")
+ROOM_SOURCES: Registry[type[RoomSource]] = Registry(
+    "rooms.source",
+    "perpetua.room_sources",
+    {
+        "infinigen": "perpetua.rooms.infinigen:InfinigenRooms",
+        "procedural": "perpetua.rooms.procedural:ProceduralRooms",
+        "file": "perpetua.rooms.files.source:SceneFileRooms",
+    },
+)

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from perpetua.actors.types import ActorMesh
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import face_areas_m2, join
 from perpetua.geometry.pinhole import unproject
 from perpetua.geometry.planes import Planes
 from perpetua.geometry.raycast import NO_FACE, Caster, MovingCaster
 from perpetua.geometry.transforms import transform_points
-from perpetua.rendering.types import RenderedView
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
 from perpetua.tracks.sides import connected_surfaces
 from perpetua.tracks.surface import SceneMeshes, SurfacePoints, join_points, plane_barycentric
 

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from perpetua.config_base import Section
+from perpetua.io.section import Section
 
 
 class TracksConfig(Section):

@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Int64
 
-from perpetua.actors.types import ActorMesh
-from perpetua.cameras.types import CameraPath
-from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
+from perpetua.scene.room import Room
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.queries import draw_queries, project_tracks
 from perpetua.tracks.sides import SideTable

@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Bool, Float32, Float64
 
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.pinhole import project
 from perpetua.geometry.transforms import invert_rigid, transform_points
+from perpetua.scene.camera import CameraPath
 from perpetua.tracks.placed import as_exported
 from perpetua.tracks.types import ViewTracks
 from perpetua.tracks.visibility import exported_intrinsics

@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Bool, Int32, Int64
 from scipy.sparse import csr_matrix
 
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.pinhole import project
 from perpetua.geometry.transforms import invert_rigid, transform_points
+from perpetua.scene.camera import CameraPath
 from perpetua.tracks.surface import BoundPoints
 
 IMAGE_CELLS = 8

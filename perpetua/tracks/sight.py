@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
-from perpetua.actors.types import ActorMesh
 from perpetua.geometry.mesh import join
 from perpetua.geometry.planes import Planes
 from perpetua.geometry.raycast import NO_FACE, Caster, MovingCaster
+from perpetua.scene.actor import ActorMesh
 from perpetua.tracks.surface import SceneMeshes
 
 NOTHING = 0

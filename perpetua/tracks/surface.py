@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int32, Int64, Integer
 
-from perpetua.actors.types import ActorMesh
 from perpetua.geometry.mesh import TriMesh
-from perpetua.rooms.types import Room
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.room import Room
 
 
 @dataclass(frozen=True)

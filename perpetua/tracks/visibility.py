@@ -20,11 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.planes import Planes
 from perpetua.geometry.transforms import invert_rigid
-from perpetua.rendering.types import RenderedView
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
 from perpetua.tracks.around import Around, ViewFrame
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.placed import PlacedPoints, Placement, as_exported

@@ -3,14 +3,14 @@
 import numpy as np
 from jaxtyping import Float64
 
-from perpetua.actors.types import ActorMesh, ActorPart
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.transforms import look_at
 from perpetua.rendering.config import RenderConfig
-from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import AreaLight, Material, Room, SceneObject
+from perpetua.scene.actor import ActorMesh, ActorPart
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
+from perpetua.scene.room import AreaLight, Material, Room, SceneObject
 
 FRAMES = 3
 PLANE_INDEX, ACTOR_INDEX = 7, 41

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from perpetua.config import load_config
-from perpetua.pictures import actor_sheets
+from perpetua.runs import preview_actors as actor_sheets
 
 
 @pytest.mark.blender

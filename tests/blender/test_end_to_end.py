@@ -24,7 +24,7 @@ ONE_ROOM = ("--preset", "tiny", "--seed", str(SEED), "--start-room", str(ROOM), 
 
 
 def _command(*arguments: str) -> list[str]:
-    return [sys.executable, "-c", "from perpetua.cli import main; main()", *arguments]
+    return [sys.executable, "-c", "from perpetua.cli.app import main; main()", *arguments]
 
 
 def _perpetua(*arguments: str, code: int = 0) -> str:

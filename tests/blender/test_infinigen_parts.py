@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from perpetua.blender import SCRIPT_FOLDER
+from perpetua.machine.blender import SCRIPT_FOLDER
 
 pytestmark = pytest.mark.blender
 

@@ -13,12 +13,12 @@ from perpetua.geometry.mesh import join
 from perpetua.geometry.raycast import Caster
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
-from perpetua.rooms.acceptance import check_room
+from perpetua.rooms.acceptance.checks import check_room
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.fingerprint import room_sha256
 from perpetua.rooms.infinigen import InfinigenRooms
 from perpetua.rooms.source import RoomWish
-from perpetua.rooms.types import Room
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
 pytestmark = [pytest.mark.blender, pytest.mark.infinigen, pytest.mark.slow]

@@ -14,15 +14,15 @@ import pytest
 from jaxtyping import Float64
 from PIL import Image
 
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.transforms import look_at
 from perpetua.rendering import bake
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
-from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
+from perpetua.scene.room import Room, SceneObject
 
 pytestmark = pytest.mark.blender
 

@@ -10,11 +10,11 @@ from jaxtyping import Float64
 from PIL import Image
 from plane_scene import CONFIG, FRAMES, NORMAL, PATCH_HEIGHT_M, assert_same, patch, plane_room, two_cameras
 
-from perpetua.actors.types import ActorMesh
-from perpetua.cameras.types import CameraPath
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
-from perpetua.rendering.types import RenderedView
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
 from perpetua.seeding import StageSeed
 
 pytestmark = pytest.mark.blender

@@ -29,12 +29,12 @@ from plane_scene import (
     two_cameras,
 )
 
-from perpetua.actors.types import ActorMesh
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.pinhole import Intrinsics, unproject
 from perpetua.geometry.transforms import look_at, transform_points
 from perpetua.rendering.render import render_views
-from perpetua.rendering.types import RenderedView
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
 
 pytestmark = pytest.mark.blender
 

@@ -7,8 +7,8 @@ import pytest
 from click.testing import CliRunner, Result
 from PIL import Image
 
-from perpetua.cli import main
-from perpetua.pictures.room_gallery import PAPER
+from perpetua.cli.app import main
+from perpetua.runs.preview_rooms import PAPER
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 

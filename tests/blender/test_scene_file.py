@@ -14,9 +14,9 @@ from scene_samples import Y_UP_FROM_Z_UP, procedural_room, write_scene
 from perpetua.errors import InputError
 from perpetua.geometry.mesh import TriMesh
 from perpetua.navigation.config import NavigationConfig
-from perpetua.rooms.build import build_room
+from perpetua.rooms.acceptance.build import build_room
 from perpetua.rooms.config import RoomsConfig, SceneFileConfig
-from perpetua.rooms.types import Material, Room, SceneObject
+from perpetua.scene.room import Material, Room, SceneObject
 from perpetua.seeding import StageSeed
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
@@ -260,7 +260,7 @@ def test_a_glb_goes_through_the_whole_pipeline(tmp_path: Path) -> None:
     write_scene(procedural_room("livingroom"), tmp_path / "scene.glb")
     arguments = ["--preset", "tiny", "--seed", "3", "--device", "cpu", "--set", "sequence.frames=3"]
     arguments += ["--set", "rooms.source=file", "--set", f"rooms.file.path={tmp_path / 'scene.glb'}"]
-    command = [sys.executable, "-c", "from perpetua.cli import main; main()", "generate", *arguments]
+    command = [sys.executable, "-c", "from perpetua.cli.app import main; main()", "generate", *arguments]
     done = subprocess.run(
         [*command, "--out", str(tmp_path / "out")], capture_output=True, text=True, check=False, timeout=900
     )

@@ -39,7 +39,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SlurmCluster]:
 
 
 def _command(*arguments: str) -> list[str]:
-    return [sys.executable, "-c", "from perpetua.cli import main; main()", *arguments]
+    return [sys.executable, "-c", "from perpetua.cli.app import main; main()", *arguments]
 
 
 def _perpetua(*arguments: str, environment: dict[str, str] | None = None) -> str:

@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from perpetua.actors.bodies import BODY_MODELS
-from perpetua.actors.bodies.source import Body
+from perpetua.actors.bodies.source import BODY_MODELS, Body
 from perpetua.actors.config import ActorsConfig
-from perpetua.actors.types import BODY_JOINTS, BODY_PARENTS, BodyMotion
-from perpetua.assets import ASSET_FOLDER_VARIABLE
+from perpetua.machine.assets import ASSET_FOLDER_VARIABLE
+from perpetua.scene.actor import BODY_JOINTS, BODY_PARENTS, BodyMotion
 from perpetua.seeding import StageSeed
 
 SEED = StageSeed(seed=3, room=1, stage="actors")

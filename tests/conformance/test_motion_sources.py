@@ -18,11 +18,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 
 from motion_samples import ROUTE_KINDS, empty_room, sample_route, sample_skeleton
 
-from perpetua.actors.config import MotionConfig
-from perpetua.actors.motion import MOTION_SOURCES
-from perpetua.actors.motion.kinematics import contact_positions, joint_index, joint_positions
-from perpetua.actors.types import BodyMotion, Route
-from perpetua.assets import ASSET_FOLDER_VARIABLE
+from perpetua.machine.assets import ASSET_FOLDER_VARIABLE
+from perpetua.motion.config import MotionConfig
+from perpetua.motion.kinematics import contact_positions, joint_index, joint_positions
+from perpetua.motion.source import MOTION_SOURCES
+from perpetua.scene.actor import BodyMotion, Route
 from perpetua.seeding import StageSeed
 
 SEED = StageSeed(11, 2, "motion")

@@ -11,10 +11,10 @@ from room_sample import sample_of
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
-from perpetua.rooms.build import build_room
+from perpetua.rooms.acceptance.build import build_room
 from perpetua.rooms.config import RoomKind, RoomsConfig
 from perpetua.rooms.source import ROOM_SOURCES, draw_wish
-from perpetua.rooms.types import Material, Room
+from perpetua.scene.room import Material, Room
 from perpetua.seeding import StageSeed
 
 NAVIGATION = NavigationConfig()

@@ -4,12 +4,12 @@ import numpy as np
 import trimesh
 from jaxtyping import Float64
 
-from perpetua.actors.types import ActorMesh, ActorPart
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.transforms import look_at
-from perpetua.rooms.types import Material, Room, SceneObject
+from perpetua.scene.actor import ActorMesh, ActorPart
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Material, Room, SceneObject
 
 GREY = Material("grey", (0.5, 0.5, 0.5))
 WIDTH_M, DEPTH_M, HEIGHT_M = 6.0, 5.0, 2.6

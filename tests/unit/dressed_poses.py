@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from perpetua.actors.types import BODY_JOINTS, BODY_PARENTS, BodyMotion
+from perpetua.scene.actor import BODY_JOINTS, BODY_PARENTS, BodyMotion
 
 # Degrees about Y (negative swings what hangs down forward) and X, by joint, relative to parents.
 POSES: dict[str, dict[str, tuple[float, float]]] = {

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from perpetua.actors.bodies.makehuman import base_mesh
+from perpetua.actors.base.base_mesh import base_mesh
 
 _HEADER = "# This is a clothes file for MakeHuman\n\n"
 # Pairs of base vertices for X, Z and Y, as in MakeHuman's files; each with the axis it measures.

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float64
 from scipy.spatial.transform import Rotation
 
-from perpetua.actors.types import BODY_JOINTS, BODY_PARENTS, BodyMotion, Skeleton
+from perpetua.scene.actor import BODY_JOINTS, BODY_PARENTS, BodyMotion, Skeleton
 
 # Y up, facing +Z at rest, from ours.
 Y_UP_FROM_OURS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])

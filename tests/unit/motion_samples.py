@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from perpetua.actors.types import BODY_JOINTS, Route, Skeleton
 from perpetua.geometry.mesh import TriMesh
-from perpetua.rooms.types import Material, Room, SceneObject
+from perpetua.scene.actor import BODY_JOINTS, Route, Skeleton
+from perpetua.scene.room import Material, Room, SceneObject
 
 # Left half of a body of 1.7 m, metres.
 _JOINTS = {

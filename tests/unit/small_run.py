@@ -6,7 +6,6 @@ import numpy as np
 from synthetic_scene import make_scene
 from synthetic_sequence import make_scene_tracks
 
-from perpetua.actors.types import Route
 from perpetua.config import load_config
 from perpetua.formats.tapvid_mv import write_sequence
 from perpetua.pipeline import codec
@@ -14,6 +13,7 @@ from perpetua.pipeline.layout import OutputLayout, open_run
 from perpetua.pipeline.record import sequence_record
 from perpetua.pipeline.stages import STAGES
 from perpetua.pipeline.store import Manifest, StageFolder, output_hashes
+from perpetua.scene.actor import Route
 from perpetua.seeding import StageSeed
 
 TRACKS = 60

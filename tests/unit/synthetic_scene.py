@@ -7,14 +7,14 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from perpetua.actors.types import ActorMesh, ActorPart, BodyMotion
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.raycast import Caster
 from perpetua.geometry.transforms import look_at
-from perpetua.rendering.types import FilmedScene, RenderedView
-from perpetua.rooms.types import Material, Room, SceneObject
+from perpetua.scene.actor import ActorMesh, ActorPart, BodyMotion
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import FilmedScene, RenderedView
+from perpetua.scene.room import Material, Room, SceneObject
 
 GREY = Material("grey", (0.5, 0.5, 0.5))
 

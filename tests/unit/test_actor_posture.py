@@ -7,13 +7,13 @@ import pytest
 from motion_samples import empty_room, sample_route, sample_skeleton
 from test_actor_validation import _tubes
 
-from perpetua.actors.config import MotionConfig
-from perpetua.actors.motion.kinematics import joint_index, joint_positions
-from perpetua.actors.motion.procedural import ProceduralMotion
-from perpetua.actors.motion.rotations import about_y, about_z
-from perpetua.actors.penetration import bones_ending_at, make_probe
-from perpetua.actors.posture import hands_in_trunk, joint_excess
-from perpetua.actors.types import BodyMotion
+from perpetua.actors.checks.penetration import bones_ending_at, make_probe
+from perpetua.actors.checks.posture import hands_in_trunk, joint_excess
+from perpetua.motion.config import MotionConfig
+from perpetua.motion.kinematics import joint_index, joint_positions
+from perpetua.motion.procedural import ProceduralMotion
+from perpetua.motion.rotations import about_y, about_z
+from perpetua.scene.actor import BodyMotion
 from perpetua.seeding import StageSeed
 
 SKELETON = sample_skeleton()

@@ -11,13 +11,14 @@ from jaxtyping import Float64
 from motion_samples import empty_room, sample_route, sample_skeleton
 from synthetic_scene import GREY, box, tri
 
-from perpetua.actors.config import MotionConfig, ValidationConfig
-from perpetua.actors.motion.kinematics import CONTACT_JOINTS, joint_index, joint_positions
-from perpetua.actors.motion.procedural import ProceduralMotion
-from perpetua.actors.types import BODY_PARENTS, ActorMesh, ActorPart, BodyMotion, Route, Skeleton
-from perpetua.actors.validation import ActorReport, validate_actors
+from perpetua.actors.checks.validation import ActorReport, validate_actors
+from perpetua.actors.config import ValidationConfig
 from perpetua.errors import ActorError
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.motion.config import MotionConfig
+from perpetua.motion.kinematics import CONTACT_JOINTS, joint_index, joint_positions
+from perpetua.motion.procedural import ProceduralMotion
+from perpetua.scene.actor import BODY_PARENTS, ActorMesh, ActorPart, BodyMotion, Route, Skeleton
+from perpetua.scene.room import Room, SceneObject
 from perpetua.seeding import StageSeed
 
 FPS = 24.0

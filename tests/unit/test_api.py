@@ -11,11 +11,11 @@ from click.testing import CliRunner
 from synthetic_sequence import write_scene
 
 import perpetua
-from perpetua import generation
-from perpetua.cli import main
+from perpetua.cli.app import main
 from perpetua.errors import GenerationError, InputError, PerpetuaError, SequenceFormatError
 from perpetua.formats.reader import read_sequence
 from perpetua.pipeline.layout import read_run
+from perpetua.runs import generate as generation
 
 
 @pytest.fixture

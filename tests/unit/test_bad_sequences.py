@@ -18,7 +18,7 @@ from robustness import BadInput
 from perpetua.audit.files import load_files
 from perpetua.errors import SequenceFormatError
 from perpetua.formats.reader import read_sequence
-from perpetua.npy import open_npy
+from perpetua.io.npy import open_npy
 
 FRAMES, TRACKS, WIDTH_PX, HEIGHT_PX = 3, 5, 8, 6
 MOST_SECONDS = 10.0

@@ -11,7 +11,7 @@ from robustness import BadInput
 
 from perpetua.config import Config
 from perpetua.errors import InputError
-from perpetua.files import read_json
+from perpetua.io.files import read_json
 from perpetua.pipeline import codec, kept, store
 from perpetua.pipeline.layout import read_run
 

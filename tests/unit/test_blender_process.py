@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from perpetua.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 from perpetua.errors import AssetError, EnvironmentSetupError
+from perpetua.machine.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
 
 
 def _run(tmp_path: Path, body: str, timeout_s: float = 20.0, blender: str | None = None) -> list[Event]:
@@ -160,7 +160,7 @@ worker.emit("done")
     )
     call = f"""
 from pathlib import Path
-from perpetua.blender import run_script
+from perpetua.machine.blender import run_script
 script = Path({str(script)!r})
 run_script(script, script, blender=None, scratch=script.parent, silence_timeout_s=60.0, on_event=print)
 """

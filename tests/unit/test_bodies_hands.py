@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from perpetua.actors.bodies import makehuman, rig
-from perpetua.actors.bodies.hands import FINGER_JOINTS, makehuman_bone, parent_of, relaxed_fingers
-from perpetua.actors.bodies.makehuman import Traits
-from perpetua.actors.types import BodyMotion
+from perpetua.actors.base import base_mesh as makehuman
+from perpetua.actors.base import rig
+from perpetua.actors.base.base_mesh import Traits
+from perpetua.actors.base.hands import FINGER_JOINTS, makehuman_bone, parent_of, relaxed_fingers
+from perpetua.scene.actor import BodyMotion
 
 
 @pytest.fixture(scope="module")

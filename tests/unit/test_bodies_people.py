@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from perpetua.actors.assembly import assemble_actors, draw_bodies
+from perpetua.actors.bodies.assembly import assemble_actors, draw_bodies
 from perpetua.actors.bodies.people import draw_person
 from perpetua.actors.config import ActorsConfig
-from perpetua.actors.types import BodyMotion
 from perpetua.errors import ActorError, ConfigError
+from perpetua.scene.actor import BodyMotion
 from perpetua.seeding import StageSeed
 
 CONFIG = ActorsConfig()

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from perpetua.actors.bodies import makehuman, rig
-from perpetua.actors.bodies.makehuman import Traits
-from perpetua.actors.types import BODY_JOINTS, BODY_PARENTS, BodyMotion
+from perpetua.actors.base import base_mesh as makehuman
+from perpetua.actors.base import rig
+from perpetua.actors.base.base_mesh import Traits
+from perpetua.scene.actor import BODY_JOINTS, BODY_PARENTS, BodyMotion
 
 TRAITS = Traits(False, 0.8, 0.6, 0.7, 0.4, 0.3, 0.1, 0.2, 0.7)
 

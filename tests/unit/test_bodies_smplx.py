@@ -9,7 +9,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 from smplx_files import joints_m, model_arrays, write_model
 
-from perpetua.actors.assembly import draw_bodies
+from perpetua.actors.bodies.assembly import draw_bodies
 from perpetua.actors.bodies.smplx_clothes import Cut, cut_parts
 from perpetua.actors.bodies.smplx_model import (
     load_model,
@@ -20,8 +20,8 @@ from perpetua.actors.bodies.smplx_model import (
     usable_betas,
 )
 from perpetua.actors.config import ActorsConfig, ClothingConfig, SmplxConfig
-from perpetua.actors.types import BODY_PARENTS, BodyMotion
 from perpetua.errors import AssetError
+from perpetua.scene.actor import BODY_PARENTS, BodyMotion
 from perpetua.seeding import StageSeed
 
 BARE_HANDS = np.tile(np.eye(3), (30, 1, 1))

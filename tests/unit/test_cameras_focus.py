@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from perpetua.cameras.bodies import actor_bounds, bounds_at, capsule_distance_m
 from perpetua.cameras.config import CamerasConfig
 from perpetua.cameras.focus import FocusSchedule, FocusSegment, draw_focus
-from perpetua.cameras.wishes import draw_wishes
+from perpetua.cameras.spec import draw_wishes
 from perpetua.seeding import StageSeed, stream
 
 BOUNDS = actor_bounds(walkers(9))

@@ -8,8 +8,7 @@ import torch
 from torch import Tensor
 
 from perpetua.cameras import losses
-from perpetua.cameras.sdf import distance_at_m
-from perpetua.cameras.types import SignedDistanceField
+from perpetua.cameras.field import SignedDistanceField, distance_at_m
 
 TAN_HALF_FOV = torch.tensor([[[0.6, 0.45]]], dtype=torch.float64)
 AXIS_M = torch.zeros(1, 4, 2, dtype=torch.float64)

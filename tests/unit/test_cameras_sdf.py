@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from camera_scene import CUPBOARD_HIGH_M, CUPBOARD_LOW_M, HEIGHT_M, camera_room
 
-from perpetua.cameras.sdf import distance_at_m, polygon_distance_m, signed_distance_field
-from perpetua.cameras.types import SignedDistanceField
+from perpetua.cameras.field import SignedDistanceField, distance_at_m, polygon_distance_m, signed_distance_field
 from perpetua.errors import CameraError
 from perpetua.geometry.mesh import join
 from perpetua.geometry.raycast import Caster
-from perpetua.rooms.types import Room
+from perpetua.scene.room import Room
 
 VOXEL_M = 0.06
 

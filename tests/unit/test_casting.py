@@ -5,11 +5,12 @@ from collections import Counter
 
 import pytest
 
-from perpetua.actors.casting import action_descriptions, cast_actors
-from perpetua.actors.config import MotionConfig, PaceShares
-from perpetua.actors.motion.actions import perform, stated_paces, wants_seat
-from perpetua.actors.types import PACES
 from perpetua.errors import ConfigError
+from perpetua.motion.actions import perform, stated_paces, wants_seat
+from perpetua.motion.config import MotionConfig
+from perpetua.routes.casting import action_descriptions, cast_actors
+from perpetua.routes.config import PaceShares
+from perpetua.scene.actor import PACES
 from perpetua.seeding import StageSeed
 
 SEED = StageSeed(5, 0, "routes")

@@ -11,9 +11,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 import perpetua
-from perpetua.cli import main
+from perpetua.cli.app import main
+from perpetua.machine.system_libraries import SYSTEM_LIBRARIES
 from perpetua.pipeline.stages import STAGE_NAMES
-from perpetua.system_libraries import SYSTEM_LIBRARIES
 
 
 def _perpetua(*arguments: str) -> Result:
@@ -198,8 +198,9 @@ def test_status_of_a_run_that_has_not_begun(tmp_path: Path) -> None:
 def test_sequences_of_another_version_are_named_and_kept(tmp_path: Path) -> None:
     from perpetua.config import load_config
     from perpetua.errors import InputError
-    from perpetua.generation import GenerateRequest, open_folder
     from perpetua.pipeline.layout import OutputLayout
+    from perpetua.pipeline.room_work import GenerateRequest
+    from perpetua.runs.generate import open_folder
 
     (tmp_path / "run.json").write_text(json.dumps({"seed": 7, "rooms": [0, 1], "config": json.loads(_config_json())}))
     sequence = OutputLayout(tmp_path, load_config("tiny").export, 7, 1).sequence_folder
@@ -229,7 +230,7 @@ def test_assets_lists_licences() -> None:
 
 
 def test_doctor_names_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("perpetua.system_libraries._loads", lambda library: library != "libXi.so.6")
+    monkeypatch.setattr("perpetua.machine.system_libraries._loads", lambda library: library != "libXi.so.6")
     done = _perpetua("doctor", "--out", str(tmp_path))
     assert done.exit_code == 1
     assert "apt-get install -y libxi6" in " ".join(done.output.split())

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from perpetua.actors.bodies import makehuman
+from perpetua.actors.base import base_mesh as makehuman
+from perpetua.actors.base.base_mesh import Traits, base_mesh
+from perpetua.actors.base.piece import Piece
+from perpetua.actors.base.rig import base_weights
+from perpetua.actors.base.surface import triangles, vertex_normals
+from perpetua.actors.base.wearer import Wearer
 from perpetua.actors.bodies.hair import STYLES, make_hair
-from perpetua.actors.bodies.makehuman import Traits, base_mesh
-from perpetua.actors.bodies.rig import base_weights
 from perpetua.actors.clothing.fabrics import FABRICS, weave
 from perpetua.actors.clothing.outfit import DYES, Dressed, draw_outfit, dress
 from perpetua.actors.clothing.patterns import TopPattern, covered_by, top_field_m
-from perpetua.actors.clothing.piece import Piece
-from perpetua.actors.clothing.surface import triangles, vertex_normals
 from perpetua.actors.clothing.tailor import sew_top
-from perpetua.actors.clothing.wearer import Wearer
-from perpetua.actors.types import ActorPart
+from perpetua.scene.actor import ActorPart
 from perpetua.seeding import StageSeed
 
 BODY = slice(0, 13380)

@@ -4,9 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from perpetua.actors.clothing.drape import hemmed
-from perpetua.actors.clothing.piece import Surface
-from perpetua.actors.clothing.surface import (
+from perpetua.actors.base.piece import Surface
+from perpetua.actors.base.surface import (
     averaging,
     border_edges,
     catmull_clark,
@@ -15,6 +14,7 @@ from perpetua.actors.clothing.surface import (
     triangles,
     vertex_normals,
 )
+from perpetua.actors.clothing.drape import hemmed
 from perpetua.geometry.mesh import face_areas_m2
 
 SIZE = 6

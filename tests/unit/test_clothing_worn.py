@@ -6,18 +6,19 @@ import numpy as np
 import pytest
 from dressed_poses import POSES, posed
 
-from perpetua.actors.bodies import anny, rig
-from perpetua.actors.bodies.makehuman import base_mesh
+from perpetua.actors.base import rig
+from perpetua.actors.base.base_mesh import base_mesh
+from perpetua.actors.base.piece import Piece
+from perpetua.actors.base.surface import vertex_normals
+from perpetua.actors.base.wearer import Wearer
+from perpetua.actors.bodies import anny
 from perpetua.actors.bodies.people import draw_person
 from perpetua.actors.clothing.outfit import Dressed, Outfit, dress
 from perpetua.actors.clothing.patterns import SkirtPattern, top_field_m, trouser_field_m
-from perpetua.actors.clothing.piece import Piece
-from perpetua.actors.clothing.surface import vertex_normals
-from perpetua.actors.clothing.wearer import Wearer
 from perpetua.actors.config import ActorsConfig
-from perpetua.actors.types import BodyMotion
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.raycast import Caster
+from perpetua.scene.actor import BodyMotion
 from perpetua.seeding import StageSeed
 
 # Rooms and actors of seed 7: a jacket over a T-shirt with trousers, a long-sleeved top with shorts, a dress.

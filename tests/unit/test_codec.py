@@ -8,7 +8,7 @@ import pytest
 from perpetua.geometry.mesh import TriMesh
 from perpetua.pipeline import codec
 from perpetua.pipeline.store import output_hashes
-from perpetua.rooms.types import AreaLight, Material, Room, SceneObject
+from perpetua.scene.room import AreaLight, Material, Room, SceneObject
 
 
 def _room(folder: Path, big: int = 10) -> Room:

@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from perpetua.config import Config, field_table, load_config, presets
-from perpetua.config_reference import annotated_yaml
+from perpetua.config.reference import annotated_yaml
 from perpetua.errors import ConfigError
 
 

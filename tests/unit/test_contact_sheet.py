@@ -11,10 +11,10 @@ from PIL import Image
 from synthetic_sequence import write_scene
 
 from perpetua.formats.reader import read_sequence
-from perpetua.pictures.contact_sheet import write_contact_sheet
-from perpetua.pictures.drawing import Canvas, depth_colours
-from perpetua.pictures.plan_view import CURVES, write_plan_view
-from perpetua.pictures.sheets import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX
+from perpetua.report.pictures.contact_sheet import write_contact_sheet
+from perpetua.report.pictures.drawing import Canvas, depth_colours
+from perpetua.report.pictures.plan_view import CURVES, write_plan_view
+from perpetua.report.pictures.sheets import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX
 
 
 @pytest.fixture(scope="module")

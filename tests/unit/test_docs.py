@@ -16,17 +16,17 @@ from motion_samples import empty_room, sample_route, sample_skeleton
 from small_run import write_run
 from synthetic_sequence import write_scene
 
-from perpetua.actors.assembly import check_people
-from perpetua.actors.motion import MOTION_SOURCES
-from perpetua.cli import main
+from perpetua.actors.bodies.assembly import check_people
+from perpetua.cli.app import main
 from perpetua.config import load_config
-from perpetua.config_reference import markdown_page
+from perpetua.config.reference import markdown_page
 from perpetua.formats.reader import read_sequence
 from perpetua.formats.source import EXPORTERS, ExportSource
+from perpetua.motion.source import MOTION_SOURCES
 from perpetua.navigation.config import NavigationConfig
 from perpetua.pipeline.stages import STAGE_NAMES
 from perpetua.registry import Registry
-from perpetua.rooms.build import build_room, check_source
+from perpetua.rooms.acceptance.build import build_room, check_source
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.source import ROOM_SOURCES
 from perpetua.seeding import StageSeed
@@ -169,14 +169,14 @@ def test_the_reader_of_the_page_reads_what_ours_does(tmp_path: Path) -> None:
 def extensions() -> Iterator[None]:
     """The page's classes, in the registries as long as this module runs."""
     registries: tuple[Registry[Any], ...] = (ROOM_SOURCES, MOTION_SOURCES, EXPORTERS)
-    before = [dict(registry._entries) for registry in registries]
+    before = [dict(registry._entered) for registry in registries]
     names: dict[str, Any] = {}
     for code in blocks("docs/extending.md", "python"):
         exec(code, names)
     yield
     for registry, entries in zip(registries, before, strict=True):
-        registry._entries.clear()
-        registry._entries.update(entries)
+        registry._entered.clear()
+        registry._entered.update(entries)
 
 
 def test_the_room_source_of_the_page_makes_rooms(extensions: None, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 from synthetic_sequence import write_scene
 
-from perpetua.cli import main
+from perpetua.cli.app import main
 from perpetua.evaluation.protocol import OTHER_VIEWS, QUERY_VIEW, WORLD_MEDIAN
 
 

@@ -16,10 +16,10 @@ from perpetua.errors import PerpetuaError
 from perpetua.pipeline.cost import check_disk, estimate_cost, require_room_space
 from perpetua.pipeline.events import Event
 from perpetua.pipeline.layout import OutputLayout, open_run
+from perpetua.pipeline.os_errors import DiskError, OutOfMemoryError, explained
 from perpetua.pipeline.runner import RoomRun
 from perpetua.pipeline.stages import Stage, StageContext
 from perpetua.pipeline.store import StageFolder, output_hashes
-from perpetua.pipeline.troubles import DiskError, OutOfMemoryError, explained
 from perpetua.pipeline.work_area import free_work
 
 NUMBERS = 300_000

@@ -12,13 +12,12 @@ from PIL import Image
 from synthetic_scene import Scene
 from synthetic_sequence import write_scene
 
-from perpetua.cli import main
+from perpetua.cli.app import main
 from perpetua.errors import EnvironmentSetupError, InputError, SequenceFormatError
-from perpetua.formats.exporters import EXPORTERS
 from perpetua.formats.kubric import scene_number
 from perpetua.formats.reader import read_sequence
-from perpetua.formats.source import ExportSource
-from perpetua.pipeline.convert import export_sequence
+from perpetua.formats.source import EXPORTERS, ExportSource
+from perpetua.runs.export import export_sequence
 from perpetua.tracks.types import SequenceTracks
 
 NAME = "seed5-room0002"

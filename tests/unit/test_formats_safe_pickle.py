@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from perpetua.errors import SequenceFormatError
-from perpetua.formats.safe_pickle import read_byte_arrays
+from perpetua.io.restricted_pickle import read_byte_arrays
 
 
 def save_pickle(path: Path, content: bytes, length: int = 1) -> None:

@@ -9,8 +9,8 @@ import pytest
 from synthetic_sequence import write_scene
 
 from perpetua.errors import ConfigError, SequenceFormatError
-from perpetua.formats.exporters import EXPORTERS
 from perpetua.formats.reader import read_sequence
+from perpetua.formats.source import EXPORTERS
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,10 @@ import pytest
 from perpetua.errors import EnvironmentSetupError, RoomError
 from perpetua.navigation.config import NavigationConfig
 from perpetua.rooms import infinigen
-from perpetua.rooms.acceptance import RoomRejected
-from perpetua.rooms.build import REPORT_FILE, build_room
+from perpetua.rooms.acceptance.build import REPORT_FILE, build_room
 from perpetua.rooms.config import RoomKind, RoomsConfig
 from perpetua.rooms.infinigen import InfinigenRooms, dimensions_m
-from perpetua.rooms.source import RoomWish, draw_wish
+from perpetua.rooms.source import RoomRejected, RoomWish, draw_wish
 from perpetua.seeding import StageSeed
 
 SEED = StageSeed(7, 0, "room")

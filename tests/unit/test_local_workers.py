@@ -13,12 +13,13 @@ import pytest
 
 from perpetua.cluster import pool
 from perpetua.cluster.local import run_rooms
-from perpetua.cluster.outcome import ROOM_LOG, RoomWork
+from perpetua.cluster.outcome import ROOM_LOG
 from perpetua.errors import RouteError
+from perpetua.machine.devices import machine_share
+from perpetua.machine.free_memory import free_memory_mb
 from perpetua.pipeline.events import Event, OnEvent
-from perpetua.pipeline.free_memory import free_memory_mb
 from perpetua.pipeline.lease import hold
-from perpetua.rendering.devices import machine_share
+from perpetua.pipeline.room_work import RoomWork
 
 
 def _folder(out: Path, room: int) -> Path:

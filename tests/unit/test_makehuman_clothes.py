@@ -8,19 +8,19 @@ import pytest
 from makehuman_files import base_dm, quads_of, scale_lines, write_folder, write_garment, write_texture
 from scipy.spatial import cKDTree
 
-from perpetua.actors.assembly import draw_bodies
-from perpetua.actors.bodies.makehuman import base_mesh
-from perpetua.actors.bodies.rig import base_weights
+from perpetua.actors.base.base_mesh import base_mesh
+from perpetua.actors.base.rig import base_weights
+from perpetua.actors.bodies.assembly import draw_bodies
+from perpetua.actors.bodies.makehuman_clothes import bound_weights, fitted
 from perpetua.actors.bodies.source import Body
 from perpetua.actors.bodies.user_files import body_listing
-from perpetua.actors.clothing.makehuman_clothes import bound_weights, fitted
 from perpetua.actors.clothing.mhclo import read_binding, read_mesh
 from perpetua.actors.clothing.mhmat import load_look, read_material, without_transparent
 from perpetua.actors.clothing.wardrobe import choose_clothes, load_wardrobe
 from perpetua.actors.config import ActorsConfig, ClothingConfig
-from perpetua.actors.types import BODY_JOINTS, BodyMotion
-from perpetua.assets import ASSET_FOLDER_VARIABLE, load_manifest
 from perpetua.errors import AssetError
+from perpetua.machine.assets import ASSET_FOLDER_VARIABLE, load_manifest
+from perpetua.scene.actor import BODY_JOINTS, BodyMotion
 from perpetua.seeding import StageSeed
 
 SAMPLE = os.environ.get("PERPETUA_TEST_MAKEHUMAN", "")

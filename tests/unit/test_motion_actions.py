@@ -5,10 +5,10 @@ import logging
 import pytest
 from motion_samples import empty_room, sample_route, sample_skeleton
 
-from perpetua.actors.config import MotionConfig
-from perpetua.actors.motion.actions import known_actions, perform, stated_paces, wants_seat
-from perpetua.actors.motion.plan import make_motions
-from perpetua.actors.motion.vocabulary import ACTIONS
+from perpetua.motion.actions import known_actions, perform, stated_paces, wants_seat
+from perpetua.motion.config import MotionConfig
+from perpetua.motion.plan import make_motions
+from perpetua.motion.vocabulary import ACTIONS
 from perpetua.seeding import StageSeed
 
 SEED = StageSeed(5, 0, "motion")

@@ -7,14 +7,14 @@ import pytest
 import trimesh
 from camera_scene import as_tri_mesh, camera_path, camera_room, walker, walkers
 
-from perpetua.actors.config import RoutesConfig
-from perpetua.actors.types import ActorMesh, Route
 from perpetua.audit.clearance import FAR_M, pillars_to_mesh_m, points_to_mesh_m, points_to_moving_mesh_m
 from perpetua.audit.motion_audit import MotionAudit, MotionLimits, audit_motion
 from perpetua.cameras.config import CamerasConfig
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import join
 from perpetua.navigation.config import NavigationConfig
+from perpetua.routes.config import RoutesConfig
+from perpetua.scene.actor import ActorMesh, Route
+from perpetua.scene.camera import CameraPath
 
 FPS = 24.0
 FRAMES = 9

@@ -16,19 +16,19 @@ from motion_samples import empty_room, sample_route, sample_skeleton
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from perpetua.actors.config import ClipsConfig, MotionConfig
-from perpetua.actors.motion import MOTION_SOURCES
-from perpetua.actors.motion.clips import clip_listing
-from perpetua.actors.motion.kinematics import contact_positions
-from perpetua.actors.motion.legs import foot_of
-from perpetua.actors.motion.recorded import archive
-from perpetua.actors.motion.recorded.amass import read_amass
-from perpetua.actors.motion.recorded.bvh import read_bvh_clip
-from perpetua.actors.motion.recorded.library import action_words, clip_files, ranked_clips
-from perpetua.actors.motion.recorded.planting import WantedFoot, plant_foot
-from perpetua.actors.motion.rotations import about_y, about_z
-from perpetua.actors.types import BODY_JOINTS, BodyMotion, Route
 from perpetua.errors import AssetError
+from perpetua.motion.config import ClipsConfig, MotionConfig
+from perpetua.motion.kinematics import contact_positions
+from perpetua.motion.legs import foot_of
+from perpetua.motion.recorded import archive
+from perpetua.motion.recorded.amass import read_amass
+from perpetua.motion.recorded.bvh import read_bvh_clip
+from perpetua.motion.recorded.clips import clip_listing
+from perpetua.motion.recorded.library import action_words, clip_files, ranked_clips
+from perpetua.motion.recorded.planting import WantedFoot, plant_foot
+from perpetua.motion.rotations import about_y, about_z
+from perpetua.motion.source import MOTION_SOURCES
+from perpetua.scene.actor import BODY_JOINTS, BodyMotion, Route
 from perpetua.seeding import StageSeed
 
 # Legs of SMPL-X's mean length, so that files without lengths are of our size.

@@ -11,14 +11,14 @@ import pytest
 from motion_files import install_fake_kimodo, write_amass
 from motion_samples import empty_room, sample_route, sample_skeleton
 
-from perpetua.actors.config import KimodoConfig, MotionConfig
-from perpetua.actors.motion import MOTION_SOURCES
-from perpetua.actors.motion.kinematics import contact_positions, joint_index, joint_positions
-from perpetua.actors.motion.path import RoutePath
-from perpetua.actors.motion.recorded.kimodo_files import make_wish, read_kimodo, read_result
-from perpetua.actors.types import BODY_JOINTS, BodyMotion, Route
-from perpetua.assets import ASSET_FOLDER_VARIABLE
 from perpetua.errors import ActorError, AssetError
+from perpetua.machine.assets import ASSET_FOLDER_VARIABLE
+from perpetua.motion.config import KimodoConfig, MotionConfig
+from perpetua.motion.kinematics import contact_positions, joint_index, joint_positions
+from perpetua.motion.path import RoutePath
+from perpetua.motion.recorded.kimodo_files import make_wish, read_kimodo, read_result
+from perpetua.motion.source import MOTION_SOURCES
+from perpetua.scene.actor import BODY_JOINTS, BodyMotion, Route
 from perpetua.seeding import StageSeed
 
 SKELETON = sample_skeleton()

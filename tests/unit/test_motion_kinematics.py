@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from motion_samples import empty_room, sample_skeleton
 
-from perpetua.actors.motion.feet import FootShape, foot_track
-from perpetua.actors.motion.footsteps import Plant, step_timing
-from perpetua.actors.motion.ground import Ground
-from perpetua.actors.motion.kinematics import contact_positions, joint_positions, solve_two_bones
-from perpetua.actors.types import BodyMotion
+from perpetua.motion.feet import FootShape, foot_track
+from perpetua.motion.footsteps import Plant, step_timing
+from perpetua.motion.ground import Ground
+from perpetua.motion.kinematics import contact_positions, joint_positions, solve_two_bones
+from perpetua.scene.actor import BodyMotion
 
 
 def test_the_rest_pose_puts_every_joint_where_the_skeleton_has_it() -> None:

@@ -8,15 +8,15 @@ import pytest
 from motion_samples import empty_room, sample_route, sample_skeleton
 from synthetic_scene import GREY, box, tri
 
-from perpetua.actors.config import MotionConfig
-from perpetua.actors.motion.actions import perform
-from perpetua.actors.motion.clearing import clear_arms
-from perpetua.actors.motion.kinematics import contact_positions, joint_index, joint_positions
-from perpetua.actors.motion.performance import draw_score
-from perpetua.actors.motion.procedural import ProceduralMotion
-from perpetua.actors.types import BodyMotion, Dwell, Route
 from perpetua.geometry.mesh import TriMesh
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.motion.actions import perform
+from perpetua.motion.clearing import clear_arms
+from perpetua.motion.config import MotionConfig
+from perpetua.motion.kinematics import contact_positions, joint_index, joint_positions
+from perpetua.motion.performance import draw_score
+from perpetua.motion.procedural import ProceduralMotion
+from perpetua.scene.actor import BodyMotion, Dwell, Route
+from perpetua.scene.room import Room, SceneObject
 from perpetua.seeding import StageSeed
 
 FPS = 24.0

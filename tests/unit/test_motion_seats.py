@@ -5,8 +5,8 @@ import pytest
 import trimesh
 from synthetic_scene import GREY, box, tri
 
-from perpetua.actors.motion.seats import find_seats
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.navigation.seats import find_seats
+from perpetua.scene.room import Room, SceneObject
 
 CHAIR = (((0.45, 0.45, 0.45), (0.0, 0.0, 0.225)), ((0.018, 0.45, 0.5), (-0.21, 0.0, 0.7)))
 

@@ -11,7 +11,7 @@ from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.raster import Raster, inside_polygon, touched_cells
 from perpetua.navigation.types import NavGrid
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.scene.room import Room, SceneObject
 
 CONFIG = NavigationConfig()
 

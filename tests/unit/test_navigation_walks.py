@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from perpetua.navigation.drive import Stop, Stretch, Walk, drive
 from perpetua.navigation.floor import WalkableFloor
+from perpetua.navigation.time_parametrisation import Stop, Stretch, Walk, drive
 from perpetua.navigation.types import NavGrid, Spot
 from perpetua.navigation.walks import Manner, random_walk
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from perpetua.npz import MOST_MEMBERS, ArchiveError, open_npz
+from perpetua.io.npz import MOST_MEMBERS, ArchiveError, open_npz
 
 PLAIN = {
     "floats": np.arange(24.0).reshape(2, 3, 4),

@@ -1,7 +1,7 @@
 import numpy as np
 import torch
 
-from perpetua.optimisation import deterministic_torch, minimise
+from perpetua.optimisation.adam import deterministic_torch, minimise
 
 
 def _solve() -> tuple[torch.Tensor, dict[str, float]]:

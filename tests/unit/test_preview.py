@@ -12,16 +12,16 @@ from PIL import Image
 from synthetic_scene import Scene
 from synthetic_sequence import write_scene
 
-from perpetua.cli import main
+from perpetua.cli.app import main
 from perpetua.errors import SequenceFormatError
 from perpetua.formats.reader import Sequence, read_sequence
 from perpetua.formats.source import ExportSource
-from perpetua.pictures import video
-from perpetua.pictures.depth_sheet import write_depth_sheet
-from perpetua.pictures.object_sheet import write_object_sheet
-from perpetua.pictures.sheets import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX
-from perpetua.pictures.track_marks import choose_tracks, draw_tracks
-from perpetua.pipeline.convert import load_source
+from perpetua.report.pictures import video
+from perpetua.report.pictures.depth_sheet import write_depth_sheet
+from perpetua.report.pictures.object_sheet import write_object_sheet
+from perpetua.report.pictures.sheets import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX
+from perpetua.report.pictures.track_marks import choose_tracks, draw_tracks
+from perpetua.runs.export import load_source
 
 # The synthetic scene: 6 frames of 2 or more views of 96 x 72 px.
 CELL_HEIGHT_PX = CELL_WIDTH_PX * 72 // 96

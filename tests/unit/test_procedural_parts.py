@@ -6,11 +6,11 @@ import trimesh
 
 from perpetua.geometry.mesh import TriMesh
 from perpetua.rooms.procedural.building import BUILDERS, build_piece
-from perpetua.rooms.procedural.common_rules import CHAIR, SMALL_SIZES
-from perpetua.rooms.procedural.palette import sample_palette
-from perpetua.rooms.procedural.parts import bar, block, lathe, prism, tube
-from perpetua.rooms.procedural.plan import DETAILS, Piece
-from perpetua.rooms.procedural.soft import blanket, curtain, cushion, pillow
+from perpetua.rooms.procedural.finish.palette import sample_palette
+from perpetua.rooms.procedural.furniture.parts import bar, block, lathe, prism, tube
+from perpetua.rooms.procedural.furniture.soft import blanket, curtain, cushion, pillow
+from perpetua.rooms.procedural.layout.common_rules import CHAIR, SMALL_SIZES
+from perpetua.rooms.procedural.layout.plan import DETAILS, Piece
 
 # Of those whose size is not that of a box half a metre wide and deep.
 SIZES: dict[str, tuple[float, float, float]] = {

@@ -13,14 +13,14 @@ from matplotlib.path import Path as Outline
 from perpetua.geometry.mesh import join
 from perpetua.geometry.raycast import Caster
 from perpetua.navigation.config import NavigationConfig
-from perpetua.rooms.acceptance import RoomRejected, check_room
+from perpetua.rooms.acceptance.checks import check_room
+from perpetua.rooms.acceptance.support import find_faults
 from perpetua.rooms.config import Daytime, RoomKind, RoomsConfig
 from perpetua.rooms.procedural import ProceduralRooms
-from perpetua.rooms.procedural.plan import EXTRAS, Box, FloorPlan, RoomPlan
-from perpetua.rooms.procedural.sampling import sample_floor, sample_room
-from perpetua.rooms.source import RoomWish
-from perpetua.rooms.support import find_faults
-from perpetua.rooms.types import PATTERNS, Room
+from perpetua.rooms.procedural.layout.plan import EXTRAS, Box, FloorPlan, RoomPlan
+from perpetua.rooms.procedural.layout.sampling import sample_floor, sample_room
+from perpetua.rooms.source import RoomRejected, RoomWish
+from perpetua.scene.room import PATTERNS, Room
 from perpetua.seeding import StageSeed
 
 CONFIG = RoomsConfig()

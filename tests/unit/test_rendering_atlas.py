@@ -8,14 +8,14 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from perpetua.blender import SCRIPT_FOLDER
-from perpetua.cameras.types import CameraPath
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
+from perpetua.machine.blender import SCRIPT_FOLDER
 from perpetua.rendering.bake import bake_room, texel_budget
 from perpetua.rendering.closeness import measure_closeness
 from perpetua.rendering.config import RenderConfig
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Room, SceneObject
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ from types import ModuleType
 import click
 import pytest
 
-from perpetua.blender import SCRIPT_FOLDER
-from perpetua.commands.options import WorkerCount
-from perpetua.rendering import devices
+from perpetua.cli.options import WorkerCount
+from perpetua.machine import devices
+from perpetua.machine.blender import SCRIPT_FOLDER
 
 
 @dataclass

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from perpetua.actors.types import ActorMesh
-from perpetua.cameras.types import CameraPath
 from perpetua.errors import RenderError
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
+from perpetua.machine.devices import SHARE_VARIABLE
 from perpetua.rendering.config import RenderConfig
-from perpetua.rendering.devices import SHARE_VARIABLE
 from perpetua.rendering.frames import drop_damaged, frame_folder
 from perpetua.rendering.render import render_views
-from perpetua.rendering.types import RenderedView
-from perpetua.rooms.types import Material, Room, SceneObject
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
+from perpetua.scene.room import Material, Room, SceneObject
 
 WIDTH_PX, HEIGHT_PX, FRAMES = 8, 6, 4
 
@@ -154,7 +154,7 @@ def test_each_worker_process_is_told_its_share(
     tmp_path: Path, config: RenderConfig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(SHARE_VARIABLE, "1/2")
-    monkeypatch.setattr("perpetua.rendering.devices.usable_cores", lambda: 6)
+    monkeypatch.setattr("perpetua.machine.devices.usable_cores", lambda: 6)
     _render(tmp_path / "work", _worker(tmp_path), config, [])
     job = json.loads((tmp_path / "work" / "job.json").read_text())
     assert (job["worker"], job["workers"], job["threads"]) == (1, 2, 3)

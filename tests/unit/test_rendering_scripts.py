@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from perpetua.rendering.scripts import script_files, scripts_sha256
+from perpetua.machine.scripts import script_files, scripts_sha256
 
 
 def test_hash_follows_imports_and_nothing_else(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from PIL import Image
 from synthetic_sequence import write_scene
 
 from perpetua.actors.bodies.people import draw_person
-from perpetua.cli import main
+from perpetua.cli.app import main
 from perpetua.config import load_config
 from perpetua.formats.reader import Sequence, SequenceView
 from perpetua.report.charts import histogram, named, tally

@@ -12,12 +12,12 @@ from click.testing import CliRunner
 from synthetic_scene import Scene
 from synthetic_sequence import write_scene
 
-from perpetua.cli import main
+from perpetua.cli.app import main
 from perpetua.formats.reader import Sequence, read_sequence
 from perpetua.formats.rerun_meshes import entity_name, vertex_colours, vertex_normals
 from perpetua.formats.rerun_recording import save_recording
 from perpetua.formats.source import ExportSource, KeptMeshes
-from perpetua.rooms.types import Material
+from perpetua.scene.room import Material
 
 FRAMES, VIEWS = 6, 3
 

@@ -11,12 +11,12 @@ from synthetic_scene import make_scene
 
 from perpetua.audit.config import AuditConfig
 from perpetua.audit.verify import verify_sequence
-from perpetua.cli import main
+from perpetua.cli.app import main
 from perpetua.errors import InputError, SequenceFormatError
 from perpetua.geometry.pinhole import project
 from perpetua.geometry.transforms import invert_rigid, transform_points
 from perpetua.pipeline.kept import load_deep_scene
-from perpetua.pipeline.retrack import PixelChoice, write_other_tracks
+from perpetua.runs.resample_tracks import PixelChoice, write_other_tracks
 
 SEED, ROOM = 5, 2
 

@@ -8,10 +8,11 @@ import pytest
 
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.navigation.config import NavigationConfig
-from perpetua.rooms.acceptance import REQUIRED_FURNITURE, RoomRejected, check_room
+from perpetua.rooms.acceptance.checks import REQUIRED_FURNITURE, check_room
+from perpetua.rooms.acceptance.support import find_faults
 from perpetua.rooms.config import RoomKind, RoomsConfig
-from perpetua.rooms.support import find_faults
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.rooms.source import RoomRejected
+from perpetua.scene.room import Room, SceneObject
 
 NAVIGATION = NavigationConfig(cell_m=0.1)
 CONFIG = RoomsConfig()

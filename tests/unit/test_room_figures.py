@@ -8,7 +8,7 @@ import pytest
 from perpetua.geometry.mesh import TriMesh
 from perpetua.rooms.collider_gap import LIMIT_M, collider_gap
 from perpetua.rooms.fingerprint import room_sha256
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.scene.room import Room, SceneObject
 
 
 def _plate(x_m: tuple[float, float], y_m: tuple[float, float], z_m: float) -> TriMesh:

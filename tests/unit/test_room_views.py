@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scene_samples import procedural_room
 
-from perpetua.cameras.types import CameraPath
 from perpetua.config import load_config
 from perpetua.geometry.mesh import join
 from perpetua.geometry.pinhole import inside_image, project
 from perpetua.geometry.raycast import Caster
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
-from perpetua.pictures.room_gallery import GalleryRequest, RoomCard, _write_page, describe_room
-from perpetua.pictures.room_views import CLEARANCE_M, CUT_SHARE, TOP, RoomViews, place_views
-from perpetua.rooms.types import Room
+from perpetua.report.pictures.room_views import CLEARANCE_M, CUT_SHARE, TOP, RoomViews, place_views
+from perpetua.runs.preview_rooms import GalleryRequest, RoomCard, _write_page, describe_room
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.room import Room
 
 
 @pytest.fixture(scope="module", params=["livingroom", "bathroom"])

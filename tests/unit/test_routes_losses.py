@@ -9,7 +9,7 @@ import torch
 from scipy import ndimage
 from torch import Tensor
 
-from perpetua.actors.routes import losses
+from perpetua.routes import losses
 
 STEP_S = 0.1
 PAUSING = torch.zeros(3, 12, dtype=torch.float64)

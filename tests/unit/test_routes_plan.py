@@ -5,16 +5,18 @@ import pytest
 import trimesh
 from scipy.interpolate import CubicSpline
 
-from perpetua.actors.config import ActorsConfig, MotionConfig, RoutesConfig
-from perpetua.actors.routes import plan_routes
-from perpetua.actors.routes.checks import TimedPaths, find_violations
-from perpetua.actors.types import Route
+from perpetua.actors.config import ActorsConfig
 from perpetua.errors import RouteError
 from perpetua.geometry.mesh import TriMesh
+from perpetua.motion.config import MotionConfig
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.routes.checks import TimedPaths, find_violations
+from perpetua.routes.config import RoutesConfig
+from perpetua.routes.plan import plan_routes
+from perpetua.scene.actor import Route
+from perpetua.scene.room import Room, SceneObject
 from perpetua.seeding import StageSeed
 
 SEED = StageSeed(7, 0, "routes")

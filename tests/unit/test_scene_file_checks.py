@@ -8,13 +8,12 @@ from typing import Any
 import pytest
 
 from perpetua.errors import InputError
-from perpetua.rooms import scene_file
-from perpetua.rooms.acceptance import RoomRejected
-from perpetua.rooms.build import check_source
+from perpetua.rooms.acceptance.build import check_source
 from perpetua.rooms.config import RoomsConfig, SceneFileConfig
-from perpetua.rooms.scene_file import SceneFileRooms, trace_floor
-from perpetua.rooms.scene_file_checks import BadSceneFile, check_scene_file, find_scene_files, scene_digests
-from perpetua.rooms.source import RoomWish
+from perpetua.rooms.files import source as scene_file
+from perpetua.rooms.files.checks import BadSceneFile, check_scene_file, find_scene_files, scene_digests
+from perpetua.rooms.files.source import SceneFileRooms, trace_floor
+from perpetua.rooms.source import RoomRejected, RoomWish
 from perpetua.seeding import StageSeed
 
 WISH = RoomWish("kitchen", (6.0, 6.0, 2.8), "day", True)

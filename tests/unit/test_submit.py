@@ -9,16 +9,16 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from perpetua.cli import main
+from perpetua.cli.app import main
 from perpetua.cluster import slurm
 from perpetua.cluster.plan import Resources, make_plan
 from perpetua.cluster.task import MOST_IDLE_ATTEMPTS, RoomsTask
 from perpetua.config import Config
 from perpetua.errors import InputError, PerpetuaError
-from perpetua.files import write_json
-from perpetua.generation import GenerateRequest
+from perpetua.io.files import write_json
 from perpetua.pipeline.events import Event
 from perpetua.pipeline.layout import OutputLayout, RunRecord
+from perpetua.pipeline.room_work import GenerateRequest
 from perpetua.pipeline.runner import stage_keys
 from perpetua.pipeline.stages import STAGES
 from perpetua.pipeline.store import Manifest, StageFolder

@@ -13,10 +13,10 @@ PACKAGE = ROOT / "perpetua"
 SCRIPTS = ROOT / "blender_scripts"
 
 TORCH_MODULES = (
-    "perpetua/optimisation.py",
+    "perpetua/optimisation/adam.py",
     "perpetua/actors/",
     "perpetua/cameras/",
-    "perpetua/doctor.py",
+    "perpetua/machine/doctor.py",
     "perpetua/formats/torch_",
 )
 OPTIONAL = {"submitit": "perpetua/cluster/", "rerun": "perpetua/formats/"}
@@ -80,7 +80,9 @@ def test_optional_dependency_stays_in_its_room(module: str, home: str) -> None:
 
 
 def test_command_line_starts_without_heavy_imports() -> None:
-    code = "import sys, perpetua.cli; print(sorted({'torch', 'bpy', 'anny', 'submitit', 'rerun'} & set(sys.modules)))"
+    code = (
+        "import sys, perpetua.cli.app; print(sorted({'torch', 'bpy', 'anny', 'submitit', 'rerun'} & set(sys.modules)))"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

@@ -6,22 +6,22 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, UInt8
 from scipy.spatial import cKDTree
 
+from perpetua.actors.base.base_mesh import Traits, base_mesh, shape
+from perpetua.actors.base.piece import Piece
+from perpetua.actors.base.rig import BODY_COUNT, BoundRig, base_weights, bind, joint_index, skin
+from perpetua.actors.base.surface import triangles
+from perpetua.actors.base.wearer import Wearer
 from perpetua.actors.bodies.hair import hair_image, make_hair, scalp_field_m
-from perpetua.actors.bodies.makehuman import Traits, base_mesh, shape
+from perpetua.actors.bodies.makehuman_clothes import wear
 from perpetua.actors.bodies.people import Person, draw_person
-from perpetua.actors.bodies.rig import BODY_COUNT, BoundRig, base_weights, bind, joint_index, skin
 from perpetua.actors.bodies.skin import eye_uv, paint_eye, paint_skin, texel_places_m
-from perpetua.actors.bodies.source import BODY_MODELS, Body
-from perpetua.actors.clothing.makehuman_clothes import wear
+from perpetua.actors.bodies.source import Body
 from perpetua.actors.clothing.outfit import Dressed, dress
-from perpetua.actors.clothing.piece import Piece
 from perpetua.actors.clothing.shoes import Footing
-from perpetua.actors.clothing.surface import triangles
 from perpetua.actors.clothing.wardrobe import clothes_folder, load_wardrobe
-from perpetua.actors.clothing.wearer import Wearer
 from perpetua.actors.config import ActorsConfig
-from perpetua.actors.types import ActorPart, BodyMotion, Skeleton
-from perpetua.rooms.types import Material
+from perpetua.scene.actor import ActorPart, BodyMotion, Skeleton
+from perpetua.scene.room import Material
 from perpetua.seeding import StageSeed
 
 _BODY_VERTICES = 13380
@@ -49,7 +49,6 @@ class AnnyBody:
         return skin(self._bound, self._vertices_m, self._weights, motion)
 
 
-@BODY_MODELS.register("anny")
 class AnnyModel:
     """Draws people and dresses them."""
 

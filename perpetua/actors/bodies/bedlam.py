@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from perpetua.actors.clothing.wardrobe import words_of
-from perpetua.assets import asset_folder
 from perpetua.errors import AssetError
+from perpetua.machine.assets import asset_folder
 
 _ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tga")
 _FEMALE, _MALE = {"f", "female", "woman"}, {"m", "male", "man"}

@@ -7,15 +7,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int32
 from scipy.spatial import cKDTree
 
-from perpetua.actors.bodies.makehuman import base_mesh
-from perpetua.actors.bodies.rig import BONE_COUNT, base_weights, joint_index
+from perpetua.actors.base.base_mesh import base_mesh
+from perpetua.actors.base.piece import Piece, Surface
+from perpetua.actors.base.rig import BONE_COUNT, base_weights, joint_index
+from perpetua.actors.base.surface import catmull_clark, positive, triangles, vertex_normals
+from perpetua.actors.base.wearer import Wearer
 from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb
-from perpetua.actors.clothing.piece import Piece, Surface
-from perpetua.actors.clothing.surface import catmull_clark, positive, triangles, vertex_normals
 from perpetua.actors.clothing.unwrap import around
-from perpetua.actors.clothing.wearer import Wearer
-from perpetua.actors.types import ActorPart
-from perpetua.rooms.types import Material
+from perpetua.scene.actor import ActorPart
+from perpetua.scene.room import Material
 
 _BODY_VERTICES = 13380
 _SHORT_ROWS, _LONG_ROWS = 6, 11

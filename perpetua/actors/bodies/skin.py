@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, UInt8
 from scipy import ndimage
 
-from perpetua.actors.bodies.makehuman import base_mesh
+from perpetua.actors.base.base_mesh import base_mesh
 from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb
 
 SKIN_PX = 1024

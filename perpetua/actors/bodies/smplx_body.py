@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt8
 
+from perpetua.actors.base.hands import relaxed_fingers
 from perpetua.actors.bodies.bedlam import BedlamTextures, find_textures
 from perpetua.actors.bodies.hair import hair_image
-from perpetua.actors.bodies.hands import relaxed_fingers
 from perpetua.actors.bodies.people import draw_person
 from perpetua.actors.bodies.skin import Complexion, eye_uv, paint_eye
 from perpetua.actors.bodies.smplx_clothes import LABELS, Cut, CutSurface, cut_parts, wrapped_uv
@@ -20,15 +20,15 @@ from perpetua.actors.bodies.smplx_model import (
     rest_joints_m,
     shaped_m,
 )
-from perpetua.actors.bodies.source import BODY_MODELS, Body
+from perpetua.actors.bodies.source import Body
 from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb, weave
 from perpetua.actors.clothing.mhmat import load_image
 from perpetua.actors.clothing.outfit import DYES
 from perpetua.actors.config import ActorsConfig, SmplxConfig
-from perpetua.actors.types import BODY_JOINTS, ActorPart, BodyMotion, Skeleton
-from perpetua.assets import asset_folder
 from perpetua.errors import AssetError
-from perpetua.rooms.types import Material
+from perpetua.machine.assets import asset_folder
+from perpetua.scene.actor import BODY_JOINTS, ActorPart, BodyMotion, Skeleton
+from perpetua.scene.room import Material
 from perpetua.seeding import StageSeed
 
 _FILES = {True: "SMPLX_FEMALE.npz", False: "SMPLX_MALE.npz"}
@@ -75,7 +75,6 @@ class _Clothes:
     words: str
 
 
-@BODY_MODELS.register("smplx")
 class SmplxBodies:
     """Draws SMPL-X shapes and dresses them."""
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, Int64
 
+from perpetua.actors.base.surface import averaging, vertex_normals
 from perpetua.actors.bodies.smplx_model import LEFT_EYE, RIGHT_EYE, SmplxModel
-from perpetua.actors.clothing.surface import averaging, vertex_normals
-from perpetua.actors.types import BODY_JOINTS
+from perpetua.scene.actor import BODY_JOINTS
 
 LABELS = ("body", "left eye", "right eye", "shoes", "trousers", "top", "hair")
 _BODY, _LEFT_EYE, _RIGHT_EYE, _SHOES, _TROUSERS, _TOP, _HAIR = range(len(LABELS))

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float32, Float64, Int32
 
-from perpetua.actors.types import BODY_JOINTS, BODY_PARENTS, BodyMotion
 from perpetua.errors import AssetError
-from perpetua.npz import ArchiveError, NpzFile, open_npz
+from perpetua.io.npz import ArchiveError, NpzFile, open_npz
+from perpetua.scene.actor import BODY_JOINTS, BODY_PARENTS, BodyMotion
 
 VERTEX_COUNT, FACE_COUNT, JOINT_COUNT = 10475, 20908, 55
 LEFT_EYE, RIGHT_EYE = 23, 24
@@ -194,7 +194,7 @@ def posed_m(
     import torch
     from smplx.lbs import lbs
 
-    from perpetua.optimisation import deterministic_torch
+    from perpetua.optimisation.adam import deterministic_torch
 
     template = torch.from_numpy((vertices_m @ _SMPLX_FROM_OURS.T).astype(np.float32))[None]
     pose = torch.from_numpy(local_rotation.astype(np.float32))

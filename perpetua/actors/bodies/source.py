@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float32
 
 from perpetua.actors.config import ActorsConfig
-from perpetua.actors.types import ActorPart, BodyMotion, Skeleton
 from perpetua.registry import Registry
+from perpetua.scene.actor import ActorPart, BodyMotion, Skeleton
 from perpetua.seeding import StageSeed
 
 
@@ -52,4 +52,11 @@ class BodyModel(Protocol):
         ...
 
 
-BODY_MODELS: Registry[type[BodyModel]] = Registry("actors.body")
+BODY_MODELS: Registry[type[BodyModel]] = Registry(
+    "actors.body",
+    "perpetua.bodies",
+    {
+        "anny": "perpetua.actors.bodies.anny:AnnyModel",
+        "smplx": "perpetua.actors.bodies.smplx_body:SmplxBodies",
+    },
+)

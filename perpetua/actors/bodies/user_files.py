@@ -4,7 +4,7 @@ from perpetua.actors.bodies.bedlam import textures_folder
 from perpetua.actors.bodies.smplx_body import models_folder
 from perpetua.actors.clothing.wardrobe import clothes_folder
 from perpetua.actors.config import ActorsConfig
-from perpetua.assets import file_listing
+from perpetua.machine.assets import file_listing
 
 
 def body_listing(config: ActorsConfig) -> list[str]:

@@ -3,11 +3,11 @@
 import numpy as np
 from jaxtyping import Float64, Int32
 
+from perpetua.actors.base.piece import Piece, Surface
+from perpetua.actors.base.surface import border_edges, vertex_normals
 from perpetua.actors.clothing.fabrics import Fabric
-from perpetua.actors.clothing.piece import Piece, Surface
-from perpetua.actors.clothing.surface import border_edges, vertex_normals
-from perpetua.actors.types import ActorPart
-from perpetua.rooms.types import Material
+from perpetua.scene.actor import ActorPart
+from perpetua.scene.room import Material
 
 # Rows of a collar: metres up the neck and metres outward, from the cut edge on. The last rows fold back.
 _ROWS_M = {

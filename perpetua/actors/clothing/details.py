@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Float32, Float64
 
-from perpetua.actors.clothing.piece import Piece, Surface
-from perpetua.actors.clothing.surface import positive, vertex_normals
-from perpetua.actors.types import ActorPart
-from perpetua.rooms.types import Material
+from perpetua.actors.base.piece import Piece, Surface
+from perpetua.actors.base.surface import positive, vertex_normals
+from perpetua.scene.actor import ActorPart
+from perpetua.scene.room import Material
 
 _BUTTON_RADIUS_M, _BUTTON_STEP_M, _BUTTON_CORNERS = 0.0055, 0.085, 10
 _PLACKET_HALF_M = 0.016

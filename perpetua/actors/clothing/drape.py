@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float64, Int32
 from scipy.spatial import ConvexHull
 
-from perpetua.actors.clothing.piece import Surface
-from perpetua.actors.clothing.surface import averaging, border_edges, positive, vertex_normals
+from perpetua.actors.base.piece import Surface
+from perpetua.actors.base.surface import averaging, border_edges, positive, vertex_normals
 
 _NORMAL_PASSES = 12
 

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float64
 
-from perpetua.actors.clothing.wearer import along_arm_m, along_leg_m
+from perpetua.actors.base.wearer import along_arm_m, along_leg_m
 
 Places = Float64[np.ndarray, "P 3"]
 Values = Float64[np.ndarray, " P"]

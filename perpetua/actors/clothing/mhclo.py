@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
-from perpetua.actors.bodies.makehuman import VERTEX_COUNT
+from perpetua.actors.base.base_mesh import VERTEX_COUNT
 from perpetua.errors import AssetError
 
 _MOST_BYTES = 64 * 1024 * 1024

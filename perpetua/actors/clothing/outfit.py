@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from perpetua.actors.bodies.makehuman import base_mesh
-from perpetua.actors.bodies.rig import base_weights
+from perpetua.actors.base.base_mesh import base_mesh
+from perpetua.actors.base.piece import Piece
+from perpetua.actors.base.rig import base_weights
+from perpetua.actors.base.wearer import Wearer
 from perpetua.actors.clothing.fabrics import Fabric, weave
 from perpetua.actors.clothing.patterns import (
     SkirtPattern,
@@ -17,11 +19,9 @@ from perpetua.actors.clothing.patterns import (
     top_field_m,
     trouser_field_m,
 )
-from perpetua.actors.clothing.piece import Piece
 from perpetua.actors.clothing.shoes import Footing, ShoePattern, make_shoes, shoe_field_m
 from perpetua.actors.clothing.socks import make_socks, sock_field_m
 from perpetua.actors.clothing.tailor import sew_skirt, sew_top, sew_trousers
-from perpetua.actors.clothing.wearer import Wearer
 from perpetua.seeding import StageSeed
 
 Colour = tuple[float, float, float]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from perpetua.actors.bodies.rig import joint_index
-from perpetua.actors.clothing.wearer import along_arm_m, along_leg_m, arm_share, template_joints
+from perpetua.actors.base.rig import joint_index
+from perpetua.actors.base.wearer import along_arm_m, along_leg_m, arm_share, template_joints
 
 # Skin is hidden where cloth covers it by more than this: nobody looks further up a sleeve.
 COVERED_MARGIN_M = 0.030

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from perpetua.actors.bodies.makehuman import base_mesh
-from perpetua.actors.bodies.rig import BONE_COUNT, base_weights, joint_index, rest_joints
+from perpetua.actors.base.base_mesh import base_mesh
+from perpetua.actors.base.piece import Piece
+from perpetua.actors.base.rig import BONE_COUNT, base_weights, joint_index, rest_joints
+from perpetua.actors.base.wearer import Wearer
 from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb
-from perpetua.actors.clothing.piece import Piece
-from perpetua.actors.clothing.wearer import Wearer
-from perpetua.actors.types import ActorPart
-from perpetua.rooms.types import Material
+from perpetua.scene.actor import ActorPart
+from perpetua.scene.room import Material
 
 _SECTIONS = 26
 _ARCH = 15

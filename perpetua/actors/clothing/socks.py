@@ -5,15 +5,15 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from perpetua.actors.bodies.makehuman import base_mesh
-from perpetua.actors.bodies.rig import base_weights
+from perpetua.actors.base.base_mesh import base_mesh
+from perpetua.actors.base.piece import Piece, Surface
+from perpetua.actors.base.rig import base_weights
+from perpetua.actors.base.surface import positive, triangles, vertex_normals
+from perpetua.actors.base.wearer import Wearer
 from perpetua.actors.clothing.fabrics import Fabric
-from perpetua.actors.clothing.piece import Piece, Surface
-from perpetua.actors.clothing.surface import positive, triangles, vertex_normals
 from perpetua.actors.clothing.unwrap import limbs
-from perpetua.actors.clothing.wearer import Wearer
-from perpetua.actors.types import ActorPart
-from perpetua.rooms.types import Material
+from perpetua.scene.actor import ActorPart
+from perpetua.scene.room import Material
 
 _THICKNESS_M = 0.0025
 _IN_SHOE_M = 0.03

@@ -6,7 +6,10 @@ import numpy as np
 from jaxtyping import Bool, Float64
 from scipy.spatial import cKDTree
 
-from perpetua.actors.bodies.rig import joint_index
+from perpetua.actors.base.piece import Piece, Surface
+from perpetua.actors.base.rig import joint_index
+from perpetua.actors.base.surface import averaging, border_edges, positive, split
+from perpetua.actors.base.wearer import Wearer, along_arm_m, along_leg_m, arm_share, refined_group
 from perpetua.actors.clothing.collar import collar
 from perpetua.actors.clothing.details import back_pockets_m, buttons, chest_pocket_m, joined, patch, placket
 from perpetua.actors.clothing.drape import Drape, draped, hemmed, smooth_normals
@@ -20,12 +23,9 @@ from perpetua.actors.clothing.patterns import (
     top_field_m,
     trouser_field_m,
 )
-from perpetua.actors.clothing.piece import Piece, Surface
-from perpetua.actors.clothing.surface import averaging, border_edges, positive, split
 from perpetua.actors.clothing.unwrap import around, front_m, limbs, trunk
-from perpetua.actors.clothing.wearer import Wearer, along_arm_m, along_leg_m, arm_share, refined_group
-from perpetua.actors.types import ActorPart
-from perpetua.rooms.types import Material
+from perpetua.scene.actor import ActorPart
+from perpetua.scene.room import Material
 
 _HEM_M = 0.022
 _SHORT_SLEEVE_M = 0.30

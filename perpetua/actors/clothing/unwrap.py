@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
-from perpetua.actors.bodies.rig import joint_index
-from perpetua.actors.clothing.piece import Surface
-from perpetua.actors.clothing.wearer import template_joints
+from perpetua.actors.base.piece import Surface
+from perpetua.actors.base.rig import joint_index
+from perpetua.actors.base.wearer import template_joints
 
 _TRUNK_RADIUS_M = 0.15
 _TRUNK_DEPTH = 1.35

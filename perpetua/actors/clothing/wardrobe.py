@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from perpetua.actors.bodies.makehuman import base_mesh
+from perpetua.actors.base.base_mesh import base_mesh
 from perpetua.actors.clothing.mhclo import Binding, read_binding
 from perpetua.actors.clothing.mhmat import MaterialFile, read_material
-from perpetua.assets import asset_folder, file_listing
 from perpetua.errors import AssetError
+from perpetua.machine.assets import asset_folder, file_listing
 
 # Heights on the base mesh by which garments are told apart: the chest, the thighs, the top of boots, the neck.
 _CHEST_Z_M, _THIGH_Z_M, _BOOT_Z_M, _NECK_Z_M = (0.33, 0.43), (-0.25, -0.06), -0.45, 0.52

@@ -2,16 +2,14 @@
 
 from pathlib import Path
 
-from perpetua.rooms.acceptance import RoomRejected
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.procedural.building import build_room
-from perpetua.rooms.procedural.sampling import sample_room
-from perpetua.rooms.source import ROOM_SOURCES, RoomWish
-from perpetua.rooms.types import Room
+from perpetua.rooms.procedural.layout.sampling import sample_room
+from perpetua.rooms.source import RoomRejected, RoomWish
+from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
 
-@ROOM_SOURCES.register("procedural")
 class ProceduralRooms:
     """Draws a plan (sizes, openings, furniture, materials, light), then builds it."""
 

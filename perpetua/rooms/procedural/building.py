@@ -3,7 +3,8 @@
 from collections import Counter
 from collections.abc import Callable
 
-from perpetua.rooms.procedural import (
+from perpetua.rooms.procedural.finish.palette import Palette
+from perpetua.rooms.procedural.furniture import (
     bath,
     beds,
     decoration,
@@ -16,10 +17,9 @@ from perpetua.rooms.procedural import (
     small,
     storage,
 )
-from perpetua.rooms.procedural.palette import Palette
-from perpetua.rooms.procedural.parts import Part, turned
-from perpetua.rooms.procedural.plan import Piece, RoomPlan
-from perpetua.rooms.types import Room, SceneObject
+from perpetua.rooms.procedural.furniture.parts import Part, turned
+from perpetua.rooms.procedural.layout.plan import Piece, RoomPlan
+from perpetua.scene.room import Room, SceneObject
 
 BUILDERS: dict[str, Callable[[Piece, Palette], list[Part]]] = {
     "armchair": seating.build_sofa,

@@ -9,8 +9,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "unit"))
 from motion_files import write_amass
 from motion_samples import empty_room, sample_route, sample_skeleton
 
-from perpetua.actors.config import ClipsConfig, MotionConfig
-from perpetua.actors.motion import MOTION_SOURCES
+from perpetua.motion.config import ClipsConfig, MotionConfig
+from perpetua.motion.source import MOTION_SOURCES
 from perpetua.seeding import StageSeed
 
 _DESCRIPTIONS = {"walk.npz": "walks", "walk_talk_phone.npz": "walks while talking on the phone"}

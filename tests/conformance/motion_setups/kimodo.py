@@ -9,8 +9,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "unit"))
 from motion_files import install_fake_kimodo
 from motion_samples import empty_room, sample_route, sample_skeleton
 
-from perpetua.actors.config import KimodoConfig, MotionConfig
-from perpetua.actors.motion import MOTION_SOURCES
+from perpetua.motion.config import KimodoConfig, MotionConfig
+from perpetua.motion.source import MOTION_SOURCES
 from perpetua.seeding import StageSeed
 
 _DESCRIPTIONS = {"walk": "walks", "phone": "walks while talking on the phone"}

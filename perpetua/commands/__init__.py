@@ -1,1 +1,0 @@
-"""The commands, by what they are for. Each parses, calls the pipeline and reports; none decides."""

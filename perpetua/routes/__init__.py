@@ -1,0 +1,1 @@
+"""Where actors go: random walks, optimised together, checked against hard limits."""
