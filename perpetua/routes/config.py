@@ -1,6 +1,6 @@
 """Settings of the route stage."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from pydantic import Field, model_validator
 
@@ -67,6 +67,7 @@ class RoutesConfig(Section):
     max_redraws: int = Field(20, ge=0, le=500, description="new walks tried when a route breaks a limit")
 
 
+@runtime_checkable
 class RouteSettings(Protocol):
     """What routes need of the section ``actors``."""
 
