@@ -7,9 +7,7 @@ from pathlib import Path
 import cv2
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
-
-from doc_pages import ROOT, blocks, commands
+from tests.support.doc_pages import ROOT, blocks, commands
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from jaxtyping import Float64
 from PIL import Image
-from plane_scene import CONFIG, FRAMES, NORMAL, PATCH_HEIGHT_M, assert_same, patch, plane_room, two_cameras
 
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
@@ -16,6 +15,16 @@ from perpetua.scene.actor import ActorMesh
 from perpetua.scene.camera import CameraPath
 from perpetua.scene.filmed import RenderedView
 from perpetua.seeding import StageSeed
+from tests.support.plane_scene import (
+    CONFIG,
+    FRAMES,
+    NORMAL,
+    PATCH_HEIGHT_M,
+    assert_same,
+    patch,
+    plane_room,
+    two_cameras,
+)
 
 pytestmark = pytest.mark.blender
 

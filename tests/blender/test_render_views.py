@@ -15,7 +15,14 @@ import numpy as np
 import pytest
 from jaxtyping import Float64
 from PIL import Image
-from plane_scene import (
+
+from perpetua.geometry.pinhole import Intrinsics, unproject
+from perpetua.geometry.transforms import look_at, transform_points
+from perpetua.rendering.render import render_views
+from perpetua.scene.actor import ActorMesh
+from perpetua.scene.camera import CameraPath
+from perpetua.scene.filmed import RenderedView
+from tests.support.plane_scene import (
     ACTOR_INDEX,
     CONFIG,
     FRAMES,
@@ -28,13 +35,6 @@ from plane_scene import (
     plane_room,
     two_cameras,
 )
-
-from perpetua.geometry.pinhole import Intrinsics, unproject
-from perpetua.geometry.transforms import look_at, transform_points
-from perpetua.rendering.render import render_views
-from perpetua.scene.actor import ActorMesh
-from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
 
 pytestmark = pytest.mark.blender
 

@@ -9,17 +9,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from slurm_cluster import SlurmCluster, missing_programs, slurm_cluster, wait_for
 
 from perpetua.cluster.outcome import ROOM_LOG
 from perpetua.config import load_config
 from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout
 from perpetua.pipeline.stages import STAGE_NAMES
 from perpetua.pipeline.store import output_hashes
+from tests.support.paths import BENCHMARKS
+from tests.support.slurm_cluster import SlurmCluster, missing_programs, slurm_cluster, wait_for
 
 pytestmark = [pytest.mark.cluster, pytest.mark.blender, pytest.mark.slow]
 
-SETTINGS = Path(__file__).parents[2] / "benchmarks" / "minimal.yaml"
+SETTINGS = BENCHMARKS / "minimal.yaml"
 SEED, ROOMS = 7, 6
 WHAT = ("--config", str(SETTINGS), "--seed", str(SEED), "--rooms", str(ROOMS))
 SUBMIT = ("submit", *WHAT, "--cpus", "1", "--mem", "4", "--time", "60", "--rooms-per-task", "2", "--device", "cpu")

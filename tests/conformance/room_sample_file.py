@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from room_sample import RoomSample
-from scene_samples import procedural_room, write_scene
 
 from perpetua.rooms.config import RoomKind, RoomsConfig, SceneFileConfig
+from tests.support.room_sample import RoomSample
+from tests.support.scene_samples import procedural_room, write_scene
 
 
 def _two_scenes(source: str, kind: RoomKind, folder: Path) -> RoomsConfig:

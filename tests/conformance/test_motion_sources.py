@@ -5,7 +5,6 @@ which makes them in ``folder`` and returns the config that uses them.
 """
 
 import importlib.util
-import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,16 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
-
-from motion_samples import ROUTE_KINDS, empty_room, sample_route, sample_skeleton
-
 from perpetua.machine.assets import ASSET_FOLDER_VARIABLE
 from perpetua.motion.config import MotionConfig
 from perpetua.motion.kinematics import contact_positions, joint_index, joint_positions
 from perpetua.motion.source import MOTION_SOURCES
 from perpetua.scene.actor import BodyMotion, Route
 from perpetua.seeding import StageSeed
+from tests.support.motion_samples import ROUTE_KINDS, empty_room, sample_route, sample_skeleton
 
 SEED = StageSeed(11, 2, "motion")
 SKELETON = sample_skeleton()

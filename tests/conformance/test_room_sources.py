@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from room_sample import sample_of
 
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
@@ -16,6 +15,7 @@ from perpetua.rooms.config import RoomKind, RoomsConfig
 from perpetua.rooms.source import ROOM_SOURCES, draw_wish
 from perpetua.scene.room import Material, Room
 from perpetua.seeding import StageSeed
+from tests.support.room_sample import sample_of
 
 NAVIGATION = NavigationConfig()
 SEED = StageSeed(3, 1, "room")

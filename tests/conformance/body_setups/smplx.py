@@ -1,13 +1,9 @@
 """SMPL-X model files for the conformance suite: synthetic ones of the true shapes and keys."""
 
-import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "unit"))
-
-from smplx_files import write_model
-
 from perpetua.actors.config import ActorsConfig, SmplxConfig
+from tests.support.smplx_files import write_model
 
 
 def actors_config(folder: Path) -> ActorsConfig:

@@ -1,17 +1,13 @@
 """Clips for the conformance suite: walks of the procedural source, written as AMASS writes them."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "unit"))
-
-from motion_files import write_amass
-from motion_samples import empty_room, sample_route, sample_skeleton
 
 from perpetua.motion.config import ClipsConfig, MotionConfig
 from perpetua.motion.source import MOTION_SOURCES
 from perpetua.seeding import StageSeed
+from tests.support.motion_files import write_amass
+from tests.support.motion_samples import empty_room, sample_route, sample_skeleton
 
 _DESCRIPTIONS = {"walk.npz": "walks", "walk_talk_phone.npz": "walks while talking on the phone"}
 

@@ -1,17 +1,13 @@
 """A stand-in for Kimodo for the conformance suite, playing strides of the procedural source."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "unit"))
-
-from motion_files import install_fake_kimodo
-from motion_samples import empty_room, sample_route, sample_skeleton
 
 from perpetua.motion.config import KimodoConfig, MotionConfig
 from perpetua.motion.source import MOTION_SOURCES
 from perpetua.seeding import StageSeed
+from tests.support.motion_files import install_fake_kimodo
+from tests.support.motion_samples import empty_room, sample_route, sample_skeleton
 
 _DESCRIPTIONS = {"walk": "walks", "phone": "walks while talking on the phone"}
 
