@@ -16,6 +16,7 @@ TORCH_MODULES = (
     "perpetua/optimisation/adam.py",
     "perpetua/actors/",
     "perpetua/cameras/",
+    "perpetua/routes/",
     "perpetua/machine/doctor.py",
     "perpetua/formats/torch_",
 )
