@@ -25,7 +25,7 @@ from perpetua.rooms.acceptance.build import build_room, check_source
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.source import ROOM_SOURCES
 from perpetua.seeding import StageSeed
-from tests.support.doc_pages import PAGES, PROGRAMS, ROOT, DocCommand, blocks, commands
+from tests.support.doc_pages import ALL_PAGES, PROGRAMS, ROOT, DocCommand, blocks, commands
 from tests.support.makehuman_files import write_folder
 from tests.support.motion_samples import empty_room, sample_route, sample_skeleton
 from tests.support.small_run import write_run
@@ -118,7 +118,7 @@ def _small(arguments: list[str]) -> list[str]:
     return arguments
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.name))
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page: Path) -> None:
     targets = re.findall(r"(?:\]\(|(?:href|src)=\")([^)#\"]+)", page.read_text(encoding="utf-8"))
     missing = [target for target in targets if "://" not in target and not (page.parent / target).exists()]

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from tests.support.paths import ROOT
 
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+# Those whose commands are not run too: for people who change Perpetua, and the reference made of docstrings.
+ALL_PAGES = (*PAGES, *sorted((ROOT / "docs/reference").glob("*.md")), ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md")
 PROGRAMS = (".venv/bin/perpetua", "perpetua")
 # Stands in examples for what the reader had before, and for a folder of a cluster.
 _ELISION, _SHARED = "...", "/shared/"
