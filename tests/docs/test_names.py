@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from perpetua.actors.bodies.source import BODY_MODELS
+from perpetua.cli.app import main
 from perpetua.formats.source import EXPORTERS
 from perpetua.motion.source import MOTION_SOURCES
 from perpetua.rooms.source import ROOM_SOURCES
@@ -39,6 +40,12 @@ def _is_there(name: str) -> bool:
 def test_names_of_the_page_are_there(page: Path) -> None:
     names = {name for name in _NAME.findall(page.read_text(encoding="utf-8")) if not _WRITTEN.search(name)}
     assert sorted(name for name in names - GROUPS if not _is_there(name)) == []
+
+
+def test_every_command_is_on_the_page() -> None:
+    page = (ROOT / "docs/command_line.md").read_text(encoding="utf-8")
+    named = re.findall(r"^\| `([a-z]+)` \|", page, re.MULTILINE)
+    assert sorted(named) == sorted(name for name, command in main.commands.items() if not command.hidden)
 
 
 def test_a_name_that_moved_would_be_noticed() -> None:
