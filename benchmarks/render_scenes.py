@@ -17,7 +17,7 @@ from PIL import Image as Pillow
 
 from perpetua.config import Config
 from perpetua.io.files import read_json, write_json
-from perpetua.machine.blender import SCRIPT_FOLDER, Event, run_script
+from perpetua.machine.blender import Event, run_script
 from perpetua.machine.memory import PeakMemory
 from perpetua.pipeline import codec
 from perpetua.pipeline.layout import OutputLayout, read_run
@@ -36,7 +36,7 @@ from perpetua.scene.camera import CameraPath
 from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
-PLAIN_LOOP = SCRIPT_FOLDER / "plain_loop.py"
+PLAIN_LOOP = Path(__file__).parent / "blender" / "plain_loop.py"
 AS_MADE_FILE = "as_made.blend"
 SILENCE_S = 3600.0
 

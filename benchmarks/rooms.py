@@ -28,6 +28,7 @@ from perpetua.navigation.config import NavigationConfig
 from perpetua.rooms.acceptance.build import REPORT_FILE, build_room
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.fingerprint import room_sha256
+from perpetua.rooms.infinigen import SCRIPT
 from perpetua.seeding import StageSeed
 
 PACKAGE = Path(__file__).parents[1] / "perpetua"
@@ -80,12 +81,10 @@ def _code_sha256(source: str) -> str:
     """Of the code that makes and checks the rooms of a source."""
     digest = hashlib.sha256()
     if source == "infinigen":
-        digest.update(scripts_sha256(("infinigen_room.py",)).encode())
-    rooms = PACKAGE / "rooms"
-    modules = ("acceptance", "build", "collider_gap", "config", "infinigen", "source", "support")
-    paths = [rooms / f"{module}.py" for module in modules]
-    for path in paths + (sorted((rooms / "procedural").glob("*.py")) if source == "procedural" else []):
-        digest.update(path.name.encode() + path.read_bytes())
+        digest.update(scripts_sha256((SCRIPT,)).encode())
+    for path in sorted((PACKAGE / "rooms").rglob("*.py")):
+        if source == "procedural" or "procedural" not in path.parts:
+            digest.update(path.relative_to(PACKAGE).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()
 
 

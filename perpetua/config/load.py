@@ -11,8 +11,8 @@ from pydantic import ValidationError
 
 from perpetua.config.schema import Config, field_table
 from perpetua.errors import ConfigError
+from perpetua.resources import PRESET_FOLDER
 
-PRESET_FOLDER = Path(__file__).parents[2] / "configs"
 # Thousands of times as much as all settings take.
 MOST_CONFIG_BYTES = 1 << 20
 # Aliases in YAML can stand for more text than fits in memory.

@@ -9,8 +9,8 @@ from pathlib import Path
 import yaml
 
 from perpetua.errors import AssetError
+from perpetua.resources import MANIFEST_FOLDER
 
-MANIFEST_FOLDER = Path(__file__).parents[2] / "assets_manifest"
 ASSET_FOLDER_VARIABLE = "PERPETUA_ASSETS"
 
 

@@ -16,7 +16,6 @@ from typing import IO, Any
 from perpetua.errors import AssetError, EnvironmentSetupError, StageError
 from perpetua.machine.system_libraries import SYSTEM_LIBRARIES
 
-SCRIPT_FOLDER = Path(__file__).parents[2] / "blender_scripts"
 # Tells a script that its stdin is a pipe which breaks when this process ends, even before the script looks for it.
 PARENT_PIPE_VARIABLE = "PERPETUA_PARENT_PIPE"
 TAIL_LINES = 12

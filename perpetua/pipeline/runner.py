@@ -231,7 +231,7 @@ def stage_keys(
 
 
 @lru_cache
-def _scripts_once(entries: tuple[str, ...]) -> str:
+def _scripts_once(entries: tuple[Path, ...]) -> str:
     """The scripts as this process first saw them, so that keys do not change under a run, and cost is paid once."""
     return scripts_sha256(entries)
 

@@ -30,6 +30,8 @@ from perpetua.rendering.config import PROCESS_SETTINGS
 from perpetua.rendering.render import BAKED_FOLDER, RENDER_SCRIPT, render_views
 from perpetua.rooms.acceptance.build import build_room
 from perpetua.rooms.files.checks import scene_digests
+from perpetua.rooms.files.source import SCRIPT as SCENE_FILE_SCRIPT
+from perpetua.rooms.infinigen import SCRIPT as INFINIGEN_SCRIPT
 from perpetua.routes.casting import action_descriptions
 from perpetua.routes.plan import plan_routes
 from perpetua.scene.actor import ActorMesh, BodyMotion, Route
@@ -116,7 +118,7 @@ class Stage:
     needs: tuple[str, ...]
     section: Callable[[Config], dict[str, Any]]
     run: Callable[[StageContext], object]
-    scripts: tuple[str, ...] = ()
+    scripts: tuple[Path, ...] = ()
     redraw: Callable[[int, RedrawConfig], int] = _never
     resumable: bool = False
     leftovers: tuple[str, ...] = ()
@@ -316,7 +318,7 @@ STAGES = (
         (),
         _room_settings,
         _room,
-        scripts=("infinigen_room.py", "scene_file.py"),
+        scripts=(INFINIGEN_SCRIPT, SCENE_FILE_SCRIPT),
         redraw=_when_routes_are_spent,
     ),
     Stage(20, "navigation", 2, ("room",), _settings("navigation"), _navigation),
@@ -346,7 +348,7 @@ STAGES = (
         ("room", "actors", "cameras"),
         _render_settings,
         _render,
-        scripts=(BAKE_SCRIPT.name, RENDER_SCRIPT.name),
+        scripts=(BAKE_SCRIPT, RENDER_SCRIPT),
         resumable=True,
         leftovers=(RENDER_JOB_FOLDER,),
     ),

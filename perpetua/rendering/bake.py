@@ -11,16 +11,17 @@ import numpy as np
 
 from perpetua.errors import RenderError
 from perpetua.io.files import file_sha256, write_json
-from perpetua.machine.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
+from perpetua.machine.blender import BlenderError, Event, run_script
 from perpetua.machine.scripts import scripts_sha256
 from perpetua.rendering.closeness import Closeness, measure_closeness
 from perpetua.rendering.config import RenderConfig
+from perpetua.resources import SCRIPT_FOLDER
 from perpetua.scene.camera import CameraPath
 from perpetua.scene.room import Room
 
 logger = logging.getLogger(__name__)
 
-BAKE_SCRIPT = SCRIPT_FOLDER / "bake_materials.py"
+BAKE_SCRIPT = SCRIPT_FOLDER / "bake" / "bake_materials.py"
 # Fewer samples than this in all cost less than baking does.
 MIN_SAMPLES = 2_000_000
 # Baking stays a small part of rendering: a texel costs about as much as one sample with the original shaders, and each
@@ -66,7 +67,7 @@ def bake_room(
     if budget == 0:
         return room.blend_path
     source = room.blend_path.resolve()
-    content = _sha256([file_sha256(source), scripts_sha256((BAKE_SCRIPT.name,))])
+    content = _sha256([file_sha256(source), scripts_sha256((BAKE_SCRIPT,))])
     closeness = measure_closeness(room, cameras)
     folder = _only_folder(cache_dir.resolve(), content)
     baked = folder / f"{_sha256([content, budget, _closeness_sha256(closeness)])}.blend"

@@ -1,4 +1,4 @@
-"""The render job as files: job.json and one .npy per array, which ``blender_scripts/render_frames.py`` reads.
+"""The render job as files: job.json and one .npy per array, which ``blender_scripts/render/render_frames.py`` reads.
 
 A file of arrays is named after its content, so job.json alone says whether two jobs are the same.
 """
@@ -15,17 +15,17 @@ import numpy as np
 from jaxtyping import Shaped
 
 from perpetua.io.files import file_sha256, write_json
-from perpetua.machine.blender import SCRIPT_FOLDER
 from perpetua.machine.devices import cpu_threads, machine_share
 from perpetua.machine.scripts import scripts_sha256
 from perpetua.rendering.config import PROCESS_SETTINGS, RenderConfig
 from perpetua.rendering.sensor import noise_seed, view_gains
+from perpetua.resources import SCRIPT_FOLDER
 from perpetua.scene.actor import ActorMesh
 from perpetua.scene.camera import CameraPath
 from perpetua.scene.room import AreaLight, Material, Room, SceneObject
 from perpetua.seeding import StageSeed
 
-RENDER_SCRIPT = SCRIPT_FOLDER / "render_frames.py"
+RENDER_SCRIPT = SCRIPT_FOLDER / "render" / "render_frames.py"
 JOB_FILE = "job.json"
 PENDING_FILE = "pending.json"
 EXPOSURE_FILE = "exposure.json"
@@ -56,7 +56,7 @@ def write_job(
     """
     writer = _ArrayWriter(folder)
     job: Settings = {
-        "scripts": scripts_sha256((RENDER_SCRIPT.name,)),
+        "scripts": scripts_sha256((RENDER_SCRIPT,)),
         "frames": len(cameras[0].world_from_camera),
         "room": _room_settings(room, writer),
         "actors": [_actor_settings(actor, writer) for actor in actors],

@@ -1,4 +1,4 @@
-"""Rooms by Infinigen Indoors 2, made by ``blender_scripts/infinigen_room.py`` in a process of its own."""
+"""Rooms by Infinigen Indoors 2, made by ``blender_scripts/infinigen/infinigen_room.py`` in a process of its own."""
 
 import importlib.util
 import json
@@ -12,7 +12,8 @@ import numpy as np
 from perpetua.errors import EnvironmentSetupError
 from perpetua.geometry.mesh import TriMesh
 from perpetua.io.files import write_json
-from perpetua.machine.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
+from perpetua.machine.blender import BlenderError, Event, run_script
+from perpetua.resources import SCRIPT_FOLDER
 from perpetua.rooms.collider_gap import ColliderGap, collider_gap
 from perpetua.rooms.config import RoomKind, RoomsConfig
 from perpetua.rooms.script_output import read_room
@@ -20,7 +21,7 @@ from perpetua.rooms.source import RoomRejected, RoomWish
 from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
-SCRIPT = SCRIPT_FOLDER / "infinigen_room.py"
+SCRIPT = SCRIPT_FOLDER / "infinigen" / "infinigen_room.py"
 # How far Infinigen's colliders are from what is rendered, beside the room.
 COLLIDER_GAP_FILE = "collider_gap.json"
 # Infinigen furnishes a bathroom with few things: at full size most of it would be empty floor.

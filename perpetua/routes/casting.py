@@ -10,13 +10,12 @@ import yaml
 from perpetua.errors import ConfigError
 from perpetua.motion.actions import stated_paces, wants_seat
 from perpetua.motion.config import MotionConfig
+from perpetua.resources import ACTION_FOLDER
 from perpetua.routes.config import PaceShares
 from perpetua.scene.actor import PACES
 from perpetua.seeding import StageSeed
 
 logger = logging.getLogger(__name__)
-
-ACTION_FOLDER = Path(__file__).parents[2] / "configs" / "actions"
 
 
 @dataclass(frozen=True)

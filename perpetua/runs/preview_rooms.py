@@ -93,7 +93,7 @@ def _card_of(request: GalleryRequest, index: int, pictures: Path, say: Callable[
     run.run(LAST_STAGE)
     layout = OutputLayout(request.out, request.config.export, request.seed, index)
     folders = {stage.name: StageFolder(layout.work_folder, stage.number, stage.name).final for stage in STAGES}
-    scripts = scripts_sha256((BAKE_SCRIPT.name, RENDER_SCRIPT.name))
+    scripts = scripts_sha256((BAKE_SCRIPT, RENDER_SCRIPT))
     key = key_of({"room": run.keys[LAST_STAGE], "scripts": scripts, "drawing": DRAWING_VERSION})
     stem = pictures / sequence_name(request.seed, index)
     record = stem.with_suffix(".json")

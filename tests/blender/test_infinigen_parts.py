@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from perpetua.machine.blender import SCRIPT_FOLDER
+from perpetua.resources import SCRIPT_FOLDER
 
 pytestmark = pytest.mark.blender
 
@@ -19,7 +19,8 @@ import bpy
 import bmesh
 import numpy as np
 from mathutils import Matrix
-import infinigen_colors, infinigen_light, infinigen_settle, plain_meshes
+from blender_scripts.infinigen import colors, light, settle
+from blender_scripts.worker import plain_meshes
 
 def clear():
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -60,7 +61,7 @@ def settled():
         lights.append(light)
     bpy.context.view_layer.update()
     things = [thing for _, thing in made.values()]
-    gone = infinigen_settle.settle(things, [category for category, _ in made.values()], lights)
+    gone = settle.settle(things, [category for category, _ in made.values()], lights)
     moved = {thing.name: thing.location.z for thing in things + lights}
     return {"gone": sorted(thing.name for thing in gone), "moved": moved}
 
@@ -77,7 +78,7 @@ def tamed():
         source.outputs[0].default_value = (*color, 1.0)
         tree.links.new(source.outputs[0], surface.inputs["Base Color"])
         thing.data.materials.append(material)
-        infinigen_colors.tame_colors([thing], [category])
+        colors.tame_colors([thing], [category])
         answer[name] = baked(thing, tree, surface)
     return answer
 
@@ -115,7 +116,7 @@ def lit(daytime, lamps_on, has_windows):
     lamps[2].data.cycles.is_portal = True
     lamps[0].rotation_euler = (math.radians(30.0), 0.0, 0.0)
     bpy.context.view_layer.update()
-    infinigen_light.set_light(lamps, [5.0, 6.0, 2.7], daytime, lamps_on, has_windows)
+    light.set_light(lamps, [5.0, 6.0, 2.7], daytime, lamps_on, has_windows)
     bpy.context.view_layer.update()
     left = {lamp.name: lamp.data.energy for lamp in bpy.data.objects if lamp.type == "LIGHT"}
     elevation = None
@@ -164,7 +165,7 @@ COLORS = [
 @pytest.fixture(scope="module")
 def answer() -> dict[str, Any]:
     """What the scripts made of the small scenes."""
-    command = [sys.executable, "-c", CODE, str(SCRIPT_FOLDER), json.dumps(COLORS)]
+    command = [sys.executable, "-c", CODE, str(SCRIPT_FOLDER.parent), json.dumps(COLORS)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     line = next(line for line in done.stdout.splitlines() if line.startswith("ANSWER"))

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from perpetua.errors import AssetError, EnvironmentSetupError
-from perpetua.machine.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
+from perpetua.machine.blender import BlenderError, Event, run_script
+from perpetua.resources import SCRIPT_FOLDER
 
 
 def _run(tmp_path: Path, body: str, timeout_s: float = 20.0, blender: str | None = None) -> list[Event]:
@@ -147,8 +148,8 @@ def test_parent_that_is_killed_while_blender_is_loaded_leaves_no_worker(tmp_path
         f"""
 import sys, time
 from pathlib import Path
-sys.path.insert(0, {str(SCRIPT_FOLDER)!r})
-from worker_link import Worker
+sys.path.insert(0, {str(SCRIPT_FOLDER.parent)!r})
+from blender_scripts.worker.link import Worker
 here = Path(__file__).parent
 (here / "loading").touch()
 while not (here / "loaded").exists():

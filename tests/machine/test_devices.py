@@ -1,7 +1,6 @@
 """Which device each worker renders on, with stand-ins for Cycles' list of devices."""
 
 import importlib
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +11,6 @@ import pytest
 
 from perpetua.cli.options import WorkerCount
 from perpetua.machine import devices
-from perpetua.machine.blender import SCRIPT_FOLDER
 
 
 @dataclass
@@ -48,11 +46,7 @@ class Preferences:
 @pytest.fixture(scope="module")
 def choice() -> ModuleType:
     """The module of Blender's scripts; it needs the standard library alone."""
-    sys.path.insert(0, str(SCRIPT_FOLDER))
-    try:
-        return importlib.import_module("gpu_choice")
-    finally:
-        sys.path.remove(str(SCRIPT_FOLDER))
+    return importlib.import_module("blender_scripts.render.gpu_choice")
 
 
 def _used(preferences: Preferences) -> list[str]:

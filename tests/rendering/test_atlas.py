@@ -1,7 +1,6 @@
 """Texture atlases: charts keep their metres, never overlap, and share a budget."""
 
 import importlib
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -10,7 +9,6 @@ import pytest
 
 from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
-from perpetua.machine.blender import SCRIPT_FOLDER
 from perpetua.rendering.bake import bake_room, texel_budget
 from perpetua.rendering.closeness import measure_closeness
 from perpetua.rendering.config import RenderConfig
@@ -21,11 +19,7 @@ from perpetua.scene.room import Room, SceneObject
 @pytest.fixture(scope="module")
 def atlas() -> ModuleType:
     """The module of Blender's scripts; it needs numpy alone."""
-    sys.path.insert(0, str(SCRIPT_FOLDER))
-    try:
-        return importlib.import_module("atlas")
-    finally:
-        sys.path.remove(str(SCRIPT_FOLDER))
+    return importlib.import_module("blender_scripts.bake.atlas")
 
 
 def _quads(atlas: ModuleType, corners_m: np.ndarray) -> object:

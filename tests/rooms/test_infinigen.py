@@ -1,6 +1,6 @@
 """The Infinigen source without Infinigen: what it asks for, reads back, and does when things go wrong."""
 
-import importlib.util
+import importlib
 import json
 import sys
 import time
@@ -18,6 +18,7 @@ from perpetua.rooms.config import RoomKind, RoomsConfig
 from perpetua.rooms.infinigen import InfinigenRooms, dimensions_m
 from perpetua.rooms.source import RoomRejected, RoomWish, draw_wish
 from perpetua.seeding import StageSeed
+from tests.support.paths import ROOT
 
 SEED = StageSeed(7, 0, "room")
 CONFIG = RoomsConfig(timeout_s=10.0)
@@ -58,12 +59,7 @@ def _use_script(monkeypatch: pytest.MonkeyPatch, folder: Path, code: str) -> Non
 
 
 def _categories() -> ModuleType:
-    path = Path(infinigen.SCRIPT).parent / "infinigen_categories.py"
-    specification = importlib.util.spec_from_file_location("infinigen_categories", path)
-    assert specification is not None and specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+    return importlib.import_module("blender_scripts.worker.categories")
 
 
 @pytest.mark.parametrize(
@@ -140,12 +136,12 @@ def test_the_wish_reaches_the_generator(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 
 def test_a_generator_that_takes_too_much_memory_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    scripts = str(Path(infinigen.SCRIPT).parent)
+    scripts = str(ROOT)
     greedy = f"""
 import sys, time
 sys.path.insert(0, {scripts!r})
-from worker_link import Worker
-from infinigen_watchdog import Watchdog
+from blender_scripts.worker.link import Worker
+from blender_scripts.infinigen.watchdog import Watchdog
 Watchdog(Worker(), 200.0).start()
 hoard = bytearray(300_000_000)
 time.sleep(30)

@@ -1,4 +1,4 @@
-"""Rooms from scene files of the user's, read by ``blender_scripts/scene_file.py`` in a process of its own."""
+"""Rooms from scene files of the user's, read by ``blender_scripts/scene_files/`` in a process of its own."""
 
 import json
 import logging
@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from perpetua.errors import InputError
-from perpetua.machine.blender import SCRIPT_FOLDER, BlenderError, Event, run_script
+from perpetua.machine.blender import BlenderError, Event, run_script
+from perpetua.resources import SCRIPT_FOLDER
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.files.checks import BadSceneFile, check_scene_file, find_scene_files
 from perpetua.rooms.script_output import read_room
@@ -21,7 +22,7 @@ from perpetua.seeding import StageSeed
 
 logger = logging.getLogger(__name__)
 
-SCRIPT = SCRIPT_FOLDER / "scene_file.py"
+SCRIPT = SCRIPT_FOLDER / "scene_files" / "scene_file.py"
 # So many times rooms.max_triangles may a file have; the script thins them out to it.
 MOST_THINNED = 10
 # A floor that fills this share of its bounding rectangle is that rectangle.

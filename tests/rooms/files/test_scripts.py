@@ -1,23 +1,14 @@
 """The parts of the scene-file script that need no Blender: floor, scale, categories."""
 
 import importlib
-import sys
 from types import ModuleType
 
 import numpy as np
 import pytest
 
-from tests.support.paths import SCRIPTS
-
-
-@pytest.fixture(autouse=True)
-def _scripts_on_path(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(SCRIPTS))
-
 
 def _module(name: str) -> ModuleType:
-    assert str(SCRIPTS) in sys.path
-    return importlib.import_module(name)
+    return importlib.import_module(f"blender_scripts.scene_files.{name}")
 
 
 def _rectangle(low: tuple[float, float], high: tuple[float, float], z_m: float, up: bool = True) -> np.ndarray:
@@ -45,7 +36,7 @@ def _room(height_m: float = 2.6) -> np.ndarray:
 
 @pytest.mark.parametrize("scale", [0.001, 0.01, 1.0, 39.37, 1000.0])
 def test_floor_and_ceiling_are_found_at_any_scale(scale: float) -> None:
-    floors = _module("scene_floor")
+    floors = _module("floor")
     corners_m = scale * _room()
     floor = floors.find_floor(corners_m, np.zeros(len(corners_m), bool), None)
     assert floor is not None
@@ -59,7 +50,7 @@ def test_floor_and_ceiling_are_found_at_any_scale(scale: float) -> None:
 
 def test_a_floor_seen_from_below_is_a_floor() -> None:
     corners_m = np.concatenate([_rectangle((0, 0), (5, 4), 0.0, up=False), _box((1, 1, 2), (2, 2, 2.5))])
-    floor = _module("scene_floor").find_floor(corners_m, np.zeros(len(corners_m), bool), None)
+    floor = _module("floor").find_floor(corners_m, np.zeros(len(corners_m), bool), None)
     assert floor is not None
     assert (floor.z_m, floor.upward) == (0.0, False)
 
@@ -67,7 +58,7 @@ def test_a_floor_seen_from_below_is_a_floor() -> None:
 def test_what_is_called_floor_or_given_wins_over_what_is_larger() -> None:
     corners_m = np.concatenate([_rectangle((-20, -20), (20, 20), -0.5), _rectangle((0, 0), (5, 4), 0.0)])
     corners_m = np.concatenate([corners_m, _box((0, 0, 2.5), (5, 4, 2.6))])
-    find = _module("scene_floor").find_floor
+    find = _module("floor").find_floor
     nothing, named = np.zeros(len(corners_m), bool), np.zeros(len(corners_m), bool)
     named[2:4] = True
     assert find(corners_m, nothing, None).z_m == -0.5
@@ -80,7 +71,7 @@ def test_only_what_hangs_together_is_the_floor() -> None:
     parts = [_rectangle((x, y), (x + 0.49, y + 0.49), 0.0) for x in np.arange(0, 4, 0.5) for y in np.arange(0, 3, 0.5)]
     far = [_rectangle((10, 10), (12, 11), 0.01), _box((0, 0, 2), (1, 1, 2.4))]
     corners_m = np.concatenate([*parts, *far])
-    floor = _module("scene_floor").find_floor(corners_m, np.zeros(len(corners_m), bool), None)
+    floor = _module("floor").find_floor(corners_m, np.zeros(len(corners_m), bool), None)
     assert floor.low_m == pytest.approx([0.0, 0.0])
     assert floor.high_m == pytest.approx([3.99, 2.99])
     assert floor.faces.sum() == 2 * len(parts)
@@ -88,7 +79,7 @@ def test_only_what_hangs_together_is_the_floor() -> None:
 
 def test_walls_alone_have_no_floor() -> None:
     corners_m = np.concatenate([_box((0, 0, 0), (5, 0.1, 2.5)), _box((0, 4, 0), (5, 4.1, 2.5))])
-    assert _module("scene_floor").find_floor(corners_m, np.zeros(len(corners_m), bool), None) is None
+    assert _module("floor").find_floor(corners_m, np.zeros(len(corners_m), bool), None) is None
 
 
 @pytest.mark.parametrize(
@@ -104,16 +95,16 @@ def test_walls_alone_have_no_floor() -> None:
 def test_a_wrong_scale_names_the_measure_and_the_unit(
     sides_m: tuple[float, float], height_m: float | None, doors_m: list[float], now: float, measure: str, advice: str
 ) -> None:
-    refused = _module("scene_refusal").Refused
+    refused = _module("refusal").Refused
     with pytest.raises(refused) as refusal:
-        _module("scene_scale").check_scale(np.array(sides_m), height_m, doors_m, now)
+        _module("scale").check_scale(np.array(sides_m), height_m, doors_m, now)
     assert refusal.value.rule == "scale"
     assert measure in str(refusal.value)
     assert f"rooms.file.metres_per_unit, {advice}" in str(refusal.value)
 
 
 def test_rooms_of_people_pass() -> None:
-    check = _module("scene_scale").check_scale
+    check = _module("scale").check_scale
     check(np.array([4.0, 6.0]), 2.5, [2.0, 0.1], 1.0)
     check(np.array([12.0, 20.0]), 8.0, [3.0], 0.01)
     check(np.array([3.0, 3.0]), None, [], 1.0)
@@ -139,4 +130,4 @@ def test_rooms_of_people_pass() -> None:
     ],
 )
 def test_names_tell_categories(name: str, around: list[str], materials: list[str], category: str) -> None:
-    assert _module("scene_categories").guess_category(name, around, materials) == category
+    assert _module("categories").guess_category(name, around, materials) == category

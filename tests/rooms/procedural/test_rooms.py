@@ -212,7 +212,7 @@ def test_materials_are_of_the_known_patterns(kind: RoomKind) -> None:
 
 
 def test_blender_knows_every_pattern() -> None:
-    source = (SCRIPTS / "cheap_materials.py").read_text(encoding="utf-8")
+    source = (SCRIPTS / "render" / "cheap_materials.py").read_text(encoding="utf-8")
     table = source[source.index("PATTERNS: dict") :]
     assert all(f'"{pattern}": _' in table for pattern in PATTERNS if pattern != "plain")
 

@@ -1,0 +1,1 @@
+"""Entries of outside assets, installed as ``perpetua.resources.assets_manifest``."""

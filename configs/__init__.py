@@ -1,0 +1,1 @@
+"""Presets and lists of actions, installed as ``perpetua.resources.configs``."""
