@@ -307,9 +307,9 @@ def page() -> str:
     lines = [
         "# What was tried, and what happens",
         "",
-        "Made from the tests' own lists (`python -m tests.support.robustness > docs/robustness.md`); a test compares",
-        "them. Bad input ends with exit code 2, a message, and nothing written or run. Work that fails ends with exit",
-        "code 1, and the same command goes on from what is finished.",
+        "This page is made of lists that the tests use (`python -m tests.support.robustness > docs/robustness.md`);",
+        "a test compares them. Bad input ends with exit code 2 and a message, and nothing is written or run. Work that",
+        "fails ends with exit code 1; the same command goes on from what is finished.",
         "",
         "| fault | what happens | shown by |",
         "|---|---|---|",
