@@ -1,4 +1,4 @@
-"""What pages call by name is there: modules, classes, settings' groups of plug-ins."""
+"""What pages call by name is there: modules, classes, groups of plug-ins, files and folders."""
 
 import importlib
 import re
@@ -16,6 +16,7 @@ from tests.support.paths import ROOT
 
 GROUPS = {registry.group for registry in (ROOM_SOURCES, BODY_MODELS, MOTION_SOURCES, EXPORTERS)}
 _NAME = re.compile(r"(?<![\w/.-])perpetua(?:\.[A-Za-z_]\w*)+(?![\w(]*\.)")
+_FILE = re.compile(r"(?<![\w/.~-])(?:perpetua|tests|benchmarks|blender_scripts|configs|docs)/[\w./-]*[\w/]")
 # Files that a page tells the reader to write.
 _WRITTEN = re.compile(r"\.(?:def|sif|fish)$")
 
@@ -42,6 +43,12 @@ def test_names_of_the_page_are_there(page: Path) -> None:
     assert sorted(name for name in names - GROUPS if not _is_there(name)) == []
 
 
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_files_of_the_page_are_there(page: Path) -> None:
+    files = set(_FILE.findall(page.read_text(encoding="utf-8")))
+    assert sorted(file for file in files if not (ROOT / file).exists()) == []
+
+
 def test_every_command_is_on_the_page() -> None:
     page = (ROOT / "docs/command_line.md").read_text(encoding="utf-8")
     named = re.findall(r"^\| `([a-z]+)` \|", page, re.MULTILINE)
@@ -56,3 +63,4 @@ def test_a_name_that_moved_would_be_noticed() -> None:
         "perpetua.formats.layout",
         "perpetua.def",
     ]
+    assert _FILE.findall("`perpetua/gone/` and `out/tests/x`") == ["perpetua/gone/"]
