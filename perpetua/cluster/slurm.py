@@ -10,6 +10,7 @@ from typing import Any
 
 from perpetua.errors import EnvironmentSetupError, InputError, PerpetuaError
 from perpetua.io.files import read_json, write_json
+from perpetua.machine.extras import missing_extra
 
 # Slurm's default of MaxArraySize, for plans where there is no Slurm to ask.
 DEFAULT_MOST_TASKS = 1001
@@ -46,7 +47,7 @@ def require_slurm() -> None:
     try:
         import submitit  # noqa: F401
     except ImportError:
-        raise EnvironmentSetupError("submit needs submitit: .venv/bin/pip install -e '.[slurm]'") from None
+        raise missing_extra("submit", "submitit", "slurm") from None
 
 
 def most_tasks() -> int:

@@ -30,6 +30,7 @@ from perpetua.formats.rerun_layout import viewer_layout
 from perpetua.formats.rerun_meshes import entity_name, still_meshes, vertex_colours, vertex_normals
 from perpetua.formats.source import HALF_PIXEL_PX, ExportSource, KeptMeshes, image_size_px
 from perpetua.geometry.transforms import invert_rigid
+from perpetua.machine.extras import missing_extra
 
 TRAIL_FRAMES = 12
 MOVING_M = 0.05
@@ -82,9 +83,7 @@ def _sdk() -> Any:
     try:
         return import_module("rerun")
     except ImportError:
-        raise EnvironmentSetupError(
-            "a Rerun recording needs Rerun's SDK, which is not installed: .venv/bin/pip install -e '.[rerun]'"
-        ) from None
+        raise missing_extra("a Rerun recording", "rerun-sdk", "rerun") from None
 
 
 def _record(rr: Any, stream: Any, source: ExportSource) -> None:

@@ -51,14 +51,26 @@ def _libraries() -> Iterator[Finding]:
 def _packages() -> Iterator[Finding]:
     for name in NEEDED_PACKAGES:
         version = _version(name)
-        yield Finding(name, "ok" if version else "missing", version or "not installed", "" if version else "./setup.sh")
+        yield Finding(
+            name,
+            "ok" if version else "missing",
+            version or "not installed",
+            "" if version else f"./setup.sh, or pip install {name}",
+        )
     infinigen = _version("infinigen")
     yield Finding(
         "infinigen",
         "ok" if infinigen else "optional",
         infinigen or "not installed",
-        "" if infinigen else "./setup.sh, or set rooms.source to procedural",
+        "" if infinigen else "./setup.sh, or pip install 'perpetua[infinigen]', or set rooms.source to procedural",
     )
+    if _version("opencv-python"):
+        yield Finding(
+            "opencv-python",
+            "optional",
+            "installed beside opencv-python-headless, into the same folder",
+            "pip uninstall -y opencv-python, then pip install --force-reinstall --no-deps opencv-python-headless",
+        )
 
 
 def _version(package: str) -> str | None:

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from perpetua.errors import EnvironmentSetupError
 from perpetua.geometry.mesh import TriMesh
 from perpetua.io.files import write_json
 from perpetua.machine.blender import BlenderError, Event, run_script
+from perpetua.machine.extras import missing_extra
 from perpetua.resources import SCRIPT_FOLDER
 from perpetua.rooms.collider_gap import ColliderGap, collider_gap
 from perpetua.rooms.config import RoomKind, RoomsConfig
@@ -43,10 +43,7 @@ class InfinigenRooms:
             EnvironmentSetupError: Infinigen 2 is not installed.
         """
         if importlib.util.find_spec("infinigen2") is None:
-            raise EnvironmentSetupError(
-                "rooms.source 'infinigen' needs the package infinigen2, which is not installed: run "
-                ".venv/bin/pip install -e '.[infinigen]', or choose rooms.source=procedural"
-            )
+            raise missing_extra("rooms.source=infinigen", "infinigen", "infinigen", "choose rooms.source=procedural")
         return None
 
     def make(self, wish: RoomWish, config: RoomsConfig, seed: StageSeed, attempt: int, scratch: Path) -> Room:

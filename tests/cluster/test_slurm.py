@@ -1,4 +1,7 @@
-"""Rooms on a real Slurm of two virtual nodes, disturbed in many ways, against two local runs that share a folder."""
+"""Rooms on a real Slurm of two virtual nodes, disturbed in many ways, against two local runs that share a folder.
+
+The cluster works with an installed wheel, the local runs with the checkout.
+"""
 
 import json
 import os
@@ -6,6 +9,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -15,6 +19,7 @@ from perpetua.config import load_config
 from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout
 from perpetua.pipeline.stages import STAGE_NAMES
 from perpetua.pipeline.store import output_hashes
+from tests.support.installed_wheel import build_wheel, copy_sources, install_wheel
 from tests.support.paths import BENCHMARKS
 from tests.support.slurm_cluster import SlurmCluster, missing_programs, slurm_cluster, wait_for
 
@@ -39,16 +44,35 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SlurmCluster]:
         yield started
 
 
-def _command(*arguments: str) -> list[str]:
-    return [sys.executable, "-c", "from perpetua.cli.app import main; main()", *arguments]
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Python of an environment with the wheel."""
+    sources, built = tmp_path_factory.mktemp("sources"), tmp_path_factory.mktemp("built")
+    copy_sources(sources)
+    return install_wheel(build_wheel(sources, built), tmp_path_factory.mktemp("installed"))
 
 
-def _perpetua(*arguments: str, environment: dict[str, str] | None = None) -> str:
-    done = subprocess.run(
-        _command(*arguments), capture_output=True, text=True, check=False, env=environment, timeout=PATIENCE_S
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+@dataclass(frozen=True)
+class Installed:
+    """The installed program, called from a folder that holds no checkout."""
+
+    python: Path
+    folder: Path
+    environment: dict[str, str]
+
+    def __call__(self, *arguments: str) -> str:
+        """What a command prints; it must end well."""
+        done = subprocess.run(
+            [str(self.python), "-m", "perpetua", *arguments],
+            cwd=self.folder,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=PATIENCE_S,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
 
 
 def _layout(out: Path, room: int) -> OutputLayout:
@@ -90,17 +114,20 @@ def _assert_nothing_was_made_twice(out: Path) -> None:
         assert set(Counter(_events(out, kind)).values()) == {1}
 
 
-def test_a_disturbed_cluster_makes_the_bytes_of_two_local_runs(cluster: SlurmCluster, tmp_path: Path) -> None:
+def test_a_disturbed_cluster_makes_the_bytes_of_two_local_runs(
+    cluster: SlurmCluster, installed: Path, tmp_path: Path
+) -> None:
+    perpetua = Installed(installed, tmp_path, cluster.environment)
     out, local = tmp_path / "cluster", tmp_path / "local"
     folder = out / WORK_FOLDER / "slurm"
     submit = (*SUBMIT, "--out", str(out))
 
-    assert "6 to schedule" in _perpetua(*submit, "--dry-run", environment=cluster.environment)
+    assert "6 to schedule" in perpetua(*submit, "--dry-run")
     assert not out.exists()
-    assert "3 task(s) of up to 2" in _perpetua(*submit, environment=cluster.environment)
+    assert "3 task(s) of up to 2" in perpetua(*submit)
     assert folder.stat().st_mode & 0o777 == 0o700
     geometry, rest = _jobs(folder)
-    said = _perpetua(*submit, environment=cluster.environment)
+    said = perpetua(*submit)
     assert "0 finished, 6 scheduled before, 0 to schedule" in said and _jobs(folder) == [geometry, rest]
 
     # Queued again by an administrator, in the middle of geometry.
@@ -128,23 +155,24 @@ def test_a_disturbed_cluster_makes_the_bytes_of_two_local_runs(cluster: SlurmClu
     _when(cluster, lambda: cluster.tasks() == {}, "all that is queued")
 
     # The same command schedules what is missing, and that alone.
-    said = _perpetua(*submit, environment=cluster.environment)
+    said = perpetua(*submit)
     assert "0 scheduled before, " in said and "6 to schedule" not in said and "0 to schedule" not in said
     _when(cluster, lambda: cluster.tasks() == {}, "what was missing")
-    said = _perpetua(*submit, environment=cluster.environment)
+    said = perpetua(*submit)
     assert "6 finished, 0 scheduled before, 0 to schedule" in said
 
-    status = json.loads(_perpetua("status", str(out), "--json"))
+    status = json.loads(perpetua("status", str(out), "--json"))
     assert [room["state"] for room in status["rooms"]] == ["finished"] * ROOMS
     # Though a task was stopped while it rendered.
     _assert_nothing_was_made_twice(out)
 
-    generate = _command("generate", *WHAT, "--workers", "1", "--device", "cpu", "--out", str(local))
+    command = (sys.executable, "-m", "perpetua", "generate")
+    generate = [*command, *WHAT, "--workers", "1", "--device", "cpu", "--out", str(local)]
     runs = [subprocess.Popen(generate, stdout=subprocess.DEVNULL) for _ in range(2)]
     assert [run.wait(PATIENCE_S) for run in runs] == [0, 0]
     _assert_nothing_was_made_twice(local)
     for room in range(ROOMS):
         made, expected = (output_hashes(_layout(where, room).sequence_folder) for where in (out, local))
         assert len(made) > 10 and made == expected
-    _perpetua("clean", str(out))
+    perpetua("clean", str(out))
     assert not (out / WORK_FOLDER).exists()

@@ -293,7 +293,7 @@ def test_rerun_without_its_sdk_names_the_extra(
     made: tuple[Path, Scene, SequenceTracks], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "rerun", None)
-    with pytest.raises(EnvironmentSetupError, match=r"pip install -e '\.\[rerun\]'"):
+    with pytest.raises(EnvironmentSetupError, match=r"pip install 'perpetua\[rerun\]'"):
         export_sequence(made[0], "rerun", tmp_path)
 
 

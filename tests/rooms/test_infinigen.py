@@ -187,7 +187,7 @@ def test_a_hanging_generator_is_stopped(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 def test_missing_infinigen_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "infinigen2", None)
-    with pytest.raises(EnvironmentSetupError, match=r"pip install -e '\.\[infinigen\]'"):
+    with pytest.raises(EnvironmentSetupError, match=r"pip install 'perpetua\[infinigen\]'"):
         InfinigenRooms().draws(CONFIG)
 
 
