@@ -14,7 +14,7 @@ import torch
 from torch.utils.data import DataLoader
 
 import perpetua
-from perpetua.formats.torch_dataset import Clip, SequenceDataset
+from perpetua.formats import Clip, SequenceDataset
 
 CLIPS, TIMES, TRACKS = 2, 4, 64
 

@@ -57,6 +57,7 @@ def flow(sequence: Sequence) -> Predictions:
 
 
 BASELINES: dict[str, Callable[[Sequence], Predictions]] = {"still": still, "flow": flow}
+"""Trackers that learn nothing, by name: each makes predictions from a sequence's images, depth and cameras."""
 
 
 @dataclass

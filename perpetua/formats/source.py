@@ -150,3 +150,4 @@ EXPORTERS: Registry[type[Exporter]] = Registry(
         "tapvid3d": "perpetua.formats.tapvid3d:Tapvid3d",
     },
 )
+"""Exporters by the name that ``perpetua export --format`` takes."""

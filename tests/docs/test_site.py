@@ -11,7 +11,7 @@ import pytest
 
 from tests.support.paths import ROOT
 
-PUBLIC = {"perpetua": "index"}
+PUBLIC = {"perpetua": "index", "perpetua.formats": "formats", "perpetua.evaluation": "evaluation"}
 PLUG_INS = (
     "perpetua.rooms.source.RoomSource",
     "perpetua.actors.bodies.source.BodyModel",
