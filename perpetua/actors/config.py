@@ -52,7 +52,9 @@ class ClothingConfig(Section):
         description="folder of MakeHuman assets that holds clothes, hair, eyebrows and skins; "
         "empty for makehuman in the asset folder",
     )
-    hat_share: float = Field(0.15, ge=0.0, le=1.0, description="share of people who wear a hat, where there are hats")
+    hat_share: float = Field(
+        0.15, ge=0.0, le=1.0, description="share of people who wear a hat, if the wardrobe has hats"
+    )
 
 
 class SmplxConfig(Section):

@@ -17,7 +17,7 @@ class CameraWeights(Section):
     scene_clearance: float = Field(60.0, ge=0.0, description="weight of the distance to the scene")
     actor_clearance: float = Field(60.0, ge=0.0, description="weight of the distance to actors")
     framing: float = Field(40.0, ge=0.0, description="weight of the focus lying inside the image")
-    size: float = Field(3.0, ge=0.0, description="weight of the focus having the wished height in the image")
+    size: float = Field(3.0, ge=0.0, description="weight of the focus being as high in the image as its framing asks")
     coverage: float = Field(12.0, ge=0.0, description="weight of every actor being seen by two views")
     occlusion: float = Field(30.0, ge=0.0, description="weight of a clear line of sight past furniture")
     crowding: float = Field(8.0, ge=0.0, description="weight of a clear line of sight past other actors")
@@ -25,10 +25,10 @@ class CameraWeights(Section):
     smoothness: float = Field(0.3, ge=0.0, description="weight of small acceleration of position")
     rotation: float = Field(1.0, ge=0.0, description="weight of slow and steady turning")
     limits: float = Field(30.0, ge=0.0, description="weight of the limits of speed, acceleration and turning")
-    travel: float = Field(8.0, ge=0.0, description="weight of moving as far as wished")
+    travel: float = Field(8.0, ge=0.0, description="weight of moving as fast and as far as the style asks")
     revisiting: float = Field(0.5, ge=0.0, description="weight of not coming back to a place")
     diversity: float = Field(8.0, ge=0.0, description="weight of views from different directions")
-    height: float = Field(3.0, ge=0.0, description="weight of the wished height above the floor")
+    height: float = Field(3.0, ge=0.0, description="weight of the view's height above the floor")
     pitch: float = Field(20.0, ge=0.0, description="weight of not looking too steeply up or down")
     offset: float = Field(1.0, ge=0.0, description="weight of looking at the focus rather than beside it")
 
@@ -40,7 +40,7 @@ class CamerasConfig(Section):
     min_fov_deg: float = Field(35.0, ge=20.0, le=120.0, description="narrowest horizontal field of view, degrees")
     max_fov_deg: float = Field(90.0, ge=20.0, le=120.0, description="widest horizontal field of view, degrees")
     framings: tuple[Framing, ...] = Field(
-        ("wide", "medium", "wide", "close"), min_length=1, description="framing wishes, dealt to the views at random"
+        ("wide", "medium", "wide", "close"), min_length=1, description="framings, dealt to the views at random"
     )
     heights: tuple[Height, ...] = Field(
         ("eye", "table", "ceiling", "floor"), min_length=1, description="heights, dealt to the views at random"

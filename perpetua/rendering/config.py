@@ -18,8 +18,8 @@ class RenderConfig(Section):
     height_px: int = Field(512, ge=16, le=4096, description="image height, pixels")
     engine: Literal["cycles", "eevee"] = Field(
         "cycles",
-        description="what draws the pictures; eevee needs a graphics driver and lights less truly. Depth and object "
-        "index come from Cycles either way",
+        description="what draws the pictures; eevee needs a graphics driver and its light is less exact. Depth and "
+        "object index come from Cycles either way",
     )
     samples: int = Field(32, ge=1, le=16384, description="samples per pixel")
     denoise: bool = Field(True, description="denoise with Open Image Denoise, guided by albedo and normal")

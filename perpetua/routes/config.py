@@ -55,7 +55,7 @@ class RoutesConfig(Section):
     paces: PaceShares = Field(default_factory=PaceShares)
     speeds: PaceSpeeds = Field(default_factory=PaceSpeeds)
     pause_share: float = Field(
-        0.2, ge=0.0, le=0.9, description="share of time that walking actors pause at what there is to see or to use"
+        0.2, ge=0.0, le=0.9, description="share of time that walking actors pause, to look at objects or to use them"
     )
     max_speed_mps: float = Field(3.4, gt=0.0, le=8.0, description="hard limit of speed, m/s")
     max_acceleration_mps2: float = Field(5.0, gt=0.0, le=20.0, description="hard limit of acceleration, m/s^2")

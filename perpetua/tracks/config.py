@@ -21,10 +21,24 @@ class TracksConfig(Section):
         description="least share of tracks that move more than 2 m within 24 frames, as far as actors are that fast",
     )
     min_visible: int = Field(2, ge=1, description="least number of (view, frame) pairs a track is visible in")
-    tolerance_m: float = Field(0.003, gt=0.0, le=0.1, description="rendered depth in front, constant part, metres")
-    tolerance_share: float = Field(0.002, ge=0.0, le=0.1, description="rendered depth in front, share of the depth")
-    behind_m: float = Field(0.008, gt=0.0, le=0.1, description="rendered depth behind, constant part, metres")
-    behind_share: float = Field(0.008, ge=0.0, le=0.1, description="rendered depth behind, share of the depth")
+    tolerance_m: float = Field(
+        0.003, gt=0.0, le=0.1, description="farthest a visible point lies behind rendered depth, constant part, metres"
+    )
+    tolerance_share: float = Field(
+        0.002, ge=0.0, le=0.1, description="farthest a visible point lies behind rendered depth, share of the depth"
+    )
+    behind_m: float = Field(
+        0.008,
+        gt=0.0,
+        le=0.1,
+        description="farthest a visible point lies in front of rendered depth, constant part, metres",
+    )
+    behind_share: float = Field(
+        0.008,
+        ge=0.0,
+        le=0.1,
+        description="farthest a visible point lies in front of rendered depth, share of the depth",
+    )
     candidates: float = Field(
         4.0, ge=1.0, le=100.0, description="points drawn for each track wanted, of which the best spread are kept"
     )
