@@ -73,7 +73,7 @@ def sitting_route(seat_m: float, seconds: float) -> Route:
     return replace(route, position_m=route.position_m + np.array([0.52, 0.0, 0.0]), dwells=(dwell,))
 
 
-def act(body: Body, route: Route, room: Room, seed: int) -> ActorMesh:
+def animate(body: Body, route: Route, room: Room, seed: int) -> ActorMesh:
     """The body on the route."""
     (skeleton,) = measured_skeletons((body,))
     motions = make_motions((route,), (skeleton,), room, FPS, MotionConfig(), StageSeed(seed, 0, "motion"))
@@ -113,7 +113,7 @@ def strip(
     name: str, mesh: ActorMesh, room: Room, frames: list[int], turn_rad: float, fixed: bool = False
 ) -> np.ndarray:
     """One row: the body at some frames."""
-    scene = join([thing.mesh for thing in room.objects if thing.category == "chair"])
+    scene = join([obj.mesh for obj in room.objects if obj.category == "chair"])
     tiles = []
     for frame in frames:
         vertices_m = mesh.vertices_m[frame].astype(np.float64)
@@ -129,7 +129,7 @@ def action_strips(bodies: tuple[Body, ...], names: list[str]) -> list[np.ndarray
     rows = []
     for index, name in enumerate(names):
         room = stage_room()
-        mesh = act(bodies[index % len(bodies)], straight(0.0, 10.0, name), room, 3 + index)
+        mesh = animate(bodies[index % len(bodies)], straight(0.0, 10.0, name), room, 3 + index)
         rows.append(strip(name, mesh, room, eventful_frames(mesh), 0.55))
     return rows
 
@@ -146,7 +146,7 @@ def pace_strips(bodies: tuple[Body, ...]) -> list[np.ndarray]:
     """A row per pace, from the side, over one second or so."""
     rows = []
     for index, (pace, speed_mps) in enumerate(SPEEDS_MPS.items()):
-        mesh = act(bodies[index % len(bodies)], straight(speed_mps, 4.0, "walks"), stage_room(), 50 + index)
+        mesh = animate(bodies[index % len(bodies)], straight(speed_mps, 4.0, "walks"), stage_room(), 50 + index)
         rows.append(strip(f"{pace} {speed_mps} m/s", mesh, stage_room(), [40 + 3 * k for k in range(MOMENTS)], -1.45))
     return rows
 
@@ -156,7 +156,7 @@ def seat_strips(bodies: tuple[Body, ...]) -> list[np.ndarray]:
     rows = []
     for index, seat_m in enumerate((0.40, 0.44, 0.50, 0.55)):
         room = stage_room(seat_m)
-        mesh = act(bodies[index % len(bodies)], sitting_route(seat_m, 8.0), room, 70 + index)
+        mesh = animate(bodies[index % len(bodies)], sitting_route(seat_m, 8.0), room, 70 + index)
         rows.append(strip(f"seat {seat_m} m", mesh, room, [10, 36, 50, 90, 146, 170], -1.35, fixed=True))
         rows.append(strip(f"seat {seat_m} m", mesh, room, [10, 36, 50, 90, 146, 170], -0.3, fixed=True))
     return rows

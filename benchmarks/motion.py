@@ -78,7 +78,7 @@ def measure_room(folder: Path, fps: float) -> list[Soles]:
     for route, motion, actor, figures in zip(routes, motions, actors, stage["actors"], strict=True):
         found = measure_soles(actor, motion, floor, fps)
         soles.append(found)
-        middle, high = (np.percentile(found.slide_mps, share) * 100 for share in (50, 95))
+        middle, high = (np.percentile(found.slide_mps, percent) * 100 for percent in (50, 95))
         sunk_mm, floating_mm = (np.percentile(height_m, 99) * 1000 for height_m in (found.sunk_m, found.floating_m))
         print(
             f"| {folder.name} {actor.actor} | {route.description} | {middle:.2f} | {high:.2f} | {sunk_mm:.1f} | "
@@ -95,11 +95,11 @@ def print_summary(rooms: list[Path], soles: list[Soles]) -> None:
     slide_mps = np.concatenate([found.slide_mps for found in soles])
     sunk = np.mean(np.concatenate([found.sunk_m for found in soles]) < 0.01)
     floating = np.mean(np.concatenate([found.floating_m for found in soles]) < 0.015)
-    middle, high = (np.percentile(slide_mps, share) * 100 for share in (50, 95))
+    middle, high = (np.percentile(slide_mps, percent) * 100 for percent in (50, 95))
     people = [actor for stage in stages for actor in stage["actors"]]
     nearest_m = min(pair["least_distance_m"] for stage in stages for pair in stage["pairs"])
     print(f"\n{len(people)} actors; slide in contact: median {middle:.2f}, 95th percentile {high:.2f} cm/s")
-    print(f"share of contact frames sunk under 1 cm {sunk:.4f}, floating under 1.5 cm {floating:.4f}")
+    print(f"fraction of contact frames sunk under 1 cm {sunk:.4f}, floating under 1.5 cm {floating:.4f}")
     print(f"deepest in the scene {max(actor['scene_depth']['value_m'] for actor in people) * 100:.1f} cm")
     print(f"nearest two actors come {nearest_m * 100:.1f} cm (below 0: they intersect)")
     print(f"largest path error {max(actor['path_error']['value_m'] for actor in people) * 100:.1f} cm")

@@ -19,7 +19,7 @@ logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Performance:
+class DescribedMotion:
     """The actions meant, in the order said, each for the side it is done with, and the manner of all motion."""
 
     actions: tuple[Action, ...] = ()
@@ -110,28 +110,28 @@ def names(stems: frozenset[str], category: str) -> bool:
     return bool(stems & _words(category.replace("_", " ")))
 
 
-def perform(description: str) -> Performance:
+def read_description(description: str) -> DescribedMotion:
     """What a description in plain words asks of the body.
 
     Words that mean nothing known are logged as a warning that names the nearest known actions; the body then walks.
     """
-    performance = Performance()
+    described = DescribedMotion()
     understood = False
     for stems in _clauses(description):
         meant = [action for action in ACTIONS.values() if _means(stems, action)]
         manners = [effect for word, effect in _MANNERS.items() if _stem(word) in stems]
         understood = understood or bool(meant or manners or stems & _GOING or stated_paces(" ".join(stems)))
         for lean_rad, swing in manners:
-            performance = replace(
-                performance, lean_rad=performance.lean_rad + lean_rad, arm_swing=performance.arm_swing * swing
+            described = replace(
+                described, lean_rad=described.lean_rad + lean_rad, arm_swing=described.arm_swing * swing
             )
-        known = {action.verbs for action in performance.actions}
+        known = {action.verbs for action in described.actions}
         for action in (action for action in meant if action.verbs not in known):
-            performance = _with_action(performance, action, stems)
+            described = _with_action(described, action, stems)
     if not understood:
         near = difflib.get_close_matches(description.lower(), ACTIONS, n=3, cutoff=0.0)
         logger.warning("action '%s' is not understood, so the actor walks; the nearest known are %s", description, near)
-    return performance
+    return described
 
 
 def _clauses(description: str) -> list[frozenset[str]]:
@@ -145,21 +145,21 @@ def _means(stems: frozenset[str], action: Action) -> bool:
     return bool(stems & _words(action.verbs)) and (not things or bool(stems & things))
 
 
-def _with_action(performance: Performance, action: Action, stems: frozenset[str]) -> Performance:
-    """The performance with one more action: on the side that words name, and with the arms that are still free."""
+def _with_action(described: DescribedMotion, action: Action, stems: frozenset[str]) -> DescribedMotion:
+    """One more action: on the side that words name, and with the arms that are still free."""
     one_handed = (action.left is None) != (action.right is None)
     if one_handed:
         pose = action.right if action.right is not None else action.left
         on_left = "left" in stems if action.right is not None else "right" not in stems
         action = replace(action, right=None if on_left else pose, left=pose if on_left else None)
     return replace(
-        performance,
+        described,
         actions=(
-            *performance.actions,
+            *described.actions,
             replace(
                 action,
-                right=_free(action.right, performance.right),
-                left=_free(action.left, performance.left),
+                right=_free(action.right, described.right),
+                left=_free(action.left, described.left),
             ),
         ),
     )

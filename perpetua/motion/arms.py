@@ -16,8 +16,8 @@ _HANGING_TWIST_RAD = 0.12
 _PRONATION_RAD = 0.2
 # A forearm turns this far either way from the thumb towards the upper arm.
 _MOST_ROLL_RAD = 1.4
-# Shoulder blades turn with an arm that is raised above this elevation, by this share of the rest.
-_BLADE_FROM_RAD, _BLADE_SHARE = -0.35, 0.32
+# Shoulder blades turn with an arm that is raised above this elevation, by this fraction of the rest.
+_BLADE_FROM_RAD, _BLADE_FRACTION = -0.35, 0.32
 
 
 @dataclass(frozen=True)
@@ -29,13 +29,13 @@ class Arm:
     elbow: Float64[np.ndarray, "N 3 3"]
     wrist: Float64[np.ndarray, "N 3 3"]
 
-    def blended(self, other: "Arm", share: Float64[np.ndarray, " N"]) -> "Arm":
-        """This arm a share of the way to another one."""
+    def blended(self, other: "Arm", weight: Float64[np.ndarray, " N"]) -> "Arm":
+        """This arm a fraction of the way to another one."""
         return Arm(
-            blend(self.collar, other.collar, share),
-            blend(self.shoulder, other.shoulder, share),
-            blend(self.elbow, other.elbow, share),
-            blend(self.wrist, other.wrist, share),
+            blend(self.collar, other.collar, weight),
+            blend(self.shoulder, other.shoulder, weight),
+            blend(self.elbow, other.elbow, weight),
+            blend(self.wrist, other.wrist, weight),
         )
 
     def shrugged(self, side: str, raise_rad: Float64[np.ndarray, " N"]) -> "Arm":
@@ -108,7 +108,7 @@ def reaching_arm(
 def _collar(side: str, chest_from_upper: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, "N 3 3"]:
     sign = 1.0 if side == "left" else -1.0
     elevation_rad = np.arcsin(np.clip(sign * chest_from_upper[:, 2, 1], -1.0, 1.0))
-    raised_rad = _BLADE_SHARE * np.maximum(elevation_rad - _BLADE_FROM_RAD, 0.0) - 0.1
+    raised_rad = _BLADE_FRACTION * np.maximum(elevation_rad - _BLADE_FROM_RAD, 0.0) - 0.1
     return about_x(sign * raised_rad)
 
 

@@ -112,17 +112,17 @@ def _rolls(plants: tuple[Plant, ...]) -> list[_Roll]:
         rolls.append(
             _Roll(
                 plant,
-                plant.land_s + min(_mix(_LANDING_S, _JOG_LANDING_S, plant.run_share), 0.2 * duration_s),
+                plant.land_s + min(_mix(_LANDING_S, _JOG_LANDING_S, plant.run_weight), 0.2 * duration_s),
                 plant.lift_s - min(_LEAVING_S, 0.5 * duration_s),
-                float(landing) * _mix(_LANDING_PITCH_RAD, _JOG_LANDING_PITCH_RAD, plant.run_share),
+                float(landing) * _mix(_LANDING_PITCH_RAD, _JOG_LANDING_PITCH_RAD, plant.run_weight),
                 _LEAST_LEAVING_PITCH_RAD + float(leaving) * (_LEAVING_PITCH_RAD - _LEAST_LEAVING_PITCH_RAD),
             )
         )
     return rolls
 
 
-def _mix(walking: float, running: float, run_share: float) -> float:
-    return walking + run_share * (running - walking)
+def _mix(walking: float, running: float, run_weight: float) -> float:
+    return walking + run_weight * (running - walking)
 
 
 def _ahead_m(start: Plant, end: Plant) -> float:
@@ -135,11 +135,11 @@ def _stance(roll: _Roll, shape: FootShape, ground: Ground, time_s: Float64[np.nd
     landing, rising = time_s < roll.flat_s, time_s > roll.rise_s
     pitch_rad = np.zeros(len(time_s))
     if landing.any():
-        share = (time_s[landing] - plant.land_s) / (roll.flat_s - plant.land_s)
-        pitch_rad[landing] = roll.landing_rad * (1.0 - share) ** 2
+        fraction = (time_s[landing] - plant.land_s) / (roll.flat_s - plant.land_s)
+        pitch_rad[landing] = roll.landing_rad * (1.0 - fraction) ** 2
     if rising.any():
-        share = (time_s[rising] - roll.rise_s) / (plant.lift_s - roll.rise_s)
-        pitch_rad[rising] = roll.leaving_rad * share**2
+        fraction = (time_s[rising] - roll.rise_s) / (plant.lift_s - roll.rise_s)
+        pitch_rad[rising] = roll.leaving_rad * fraction**2
     pivot_m = np.where(rising[:, None], shape.toe_joint_m, shape.heel_m)
     yaw_rad = np.full(len(time_s), plant.yaw_rad)
     heel_stands, toe_stands = _stands_on(plant, shape, ground)
@@ -182,25 +182,27 @@ def _swing(
 ) -> FootTrack:
     start, end = roll.plant, following.plant
     duration_s = end.land_s - start.lift_s
-    share = (time_s - start.lift_s) / duration_s
+    fraction = (time_s - start.lift_s) / duration_s
     pitch_rate = min(roll.leaving_rate_rps, 3.0)
-    pitch_rad = _hermite(share, roll.leaving_rad, following.landing_rad, pitch_rate * duration_s, 0.0)
-    kick = end.run_share * min(1.0, max(0.0, _ahead_m(start, end)) / _FULL_STRIDE_M) * np.sin(np.pi * share**0.8) ** 2
+    pitch_rad = _hermite(fraction, roll.leaving_rad, following.landing_rad, pitch_rate * duration_s, 0.0)
+    kick = (
+        end.run_weight * min(1.0, max(0.0, _ahead_m(start, end)) / _FULL_STRIDE_M) * np.sin(np.pi * fraction**0.8) ** 2
+    )
     pitch_rad += _KICK_PITCH_RAD * kick
-    toe_pitch_rad = pitch_rad - roll.leaving_rad * (1.0 - smoothstep(share / 0.5))
+    toe_pitch_rad = pitch_rad - roll.leaving_rad * (1.0 - smoothstep(fraction / 0.5))
     turn_rad = (end.yaw_rad - start.yaw_rad + np.pi) % (2.0 * np.pi) - np.pi
-    yaw_rad = start.yaw_rad + turn_rad * smoothstep(share)
-    ankle_m = _ankle_path(roll, following, shape, share)
-    ankle_m[:, :2] += np.sin(np.pi * share)[:, None] ** 2 * end.dodge_m
+    yaw_rad = start.yaw_rad + turn_rad * smoothstep(fraction)
+    ankle_m = _ankle_path(roll, following, shape, fraction)
+    ankle_m[:, :2] += np.sin(np.pi * fraction)[:, None] ** 2 * end.dodge_m
     ankle_m[:, 2] += _HEEL_KICK_M * kick
     foot = about_z(yaw_rad) @ about_y(pitch_rad)
     toes = about_z(yaw_rad) @ about_y(toe_pitch_rad)
     heel_m = ankle_m + rotate(foot, shape.heel_m)
     toe_m = ankle_m + rotate(foot, shape.toe_joint_m) + rotate(toes, shape.toe_m - shape.toe_joint_m)
-    level_m = start.position_m[2] + (end.position_m[2] - start.position_m[2]) * share
-    floor_m = level_m + _rise_m(ground, (heel_m, toe_m), level_m, share)
+    level_m = start.position_m[2] + (end.position_m[2] - start.position_m[2]) * fraction
+    floor_m = level_m + _rise_m(ground, (heel_m, toe_m), level_m, fraction)
     low_m = np.minimum(heel_m[:, 2], toe_m[:, 2]) - floor_m
-    bump = np.sin(np.pi * share) ** 2
+    bump = np.sin(np.pi * fraction) ** 2
     ankle_m[:, 2] += _soft_positive(clearance_m * bump - low_m, 0.02 * bump)
     still = np.zeros(len(time_s), bool)
     return FootTrack(ankle_m, yaw_rad, pitch_rad, toe_pitch_rad, still, still)
@@ -210,18 +212,18 @@ def _rise_m(
     ground: Ground,
     points_m: tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]],
     level_m: Float64[np.ndarray, " N"],
-    share: Float64[np.ndarray, " N"],
+    fraction: Float64[np.ndarray, " N"],
 ) -> Float64[np.ndarray, " N"]:
     """How far the floor under a swinging foot is above the line from its last to its next place, without corners."""
     rise_m = np.max([ground.height_m(point_m[:, :2], level_m) - level_m for point_m in points_m], axis=0, initial=0.0)
     if len(rise_m) == 0 or not rise_m.any():
-        return np.zeros(len(share))
+        return np.zeros(len(fraction))
     soft_m = gaussian_filter1d(maximum_filter1d(rise_m, 9, mode="nearest"), 2.0, mode="nearest")
-    return np.asarray(soft_m * smoothstep(share / 0.15) * smoothstep((1.0 - share) / 0.1))
+    return np.asarray(soft_m * smoothstep(fraction / 0.15) * smoothstep((1.0 - fraction) / 0.1))
 
 
 def _ankle_path(
-    roll: _Roll, following: _Roll, shape: FootShape, share: Float64[np.ndarray, " N"]
+    roll: _Roll, following: _Roll, shape: FootShape, fraction: Float64[np.ndarray, " N"]
 ) -> Float64[np.ndarray, "N 3"]:
     start, end = roll.plant, following.plant
     duration_s = end.land_s - start.lift_s
@@ -233,7 +235,7 @@ def _ankle_path(
     landing_m = _ankle_over_pivot(end, shape, shape.heel_m[None], np.array([following.landing_rad]))[0]
     return np.stack(
         [
-            _hermite(share, leaving_m[0, axis], landing_m[axis], velocity_mps[axis] * duration_s, 0.0)
+            _hermite(fraction, leaving_m[0, axis], landing_m[axis], velocity_mps[axis] * duration_s, 0.0)
             for axis in range(3)
         ],
         axis=1,
@@ -241,12 +243,12 @@ def _ankle_path(
 
 
 def _hermite(
-    share: Float64[np.ndarray, " N"], start: float, end: float, start_slope: float, end_slope: float
+    fraction: Float64[np.ndarray, " N"], start: float, end: float, start_slope: float, end_slope: float
 ) -> Float64[np.ndarray, " N"]:
-    squared, cubed = share**2, share**3
+    squared, cubed = fraction**2, fraction**3
     return np.asarray(
         (2 * cubed - 3 * squared + 1) * start
-        + (cubed - 2 * squared + share) * start_slope
+        + (cubed - 2 * squared + fraction) * start_slope
         + (3 * squared - 2 * cubed) * end
         + (cubed - squared) * end_slope
     )

@@ -43,9 +43,9 @@ class StepTiming:
 
 
 def step_timing(
-    speed_mps: float, turn_rps: float, hip_height_m: float, cycle_factor: float, run_share: float = 0.0
+    speed_mps: float, turn_rps: float, hip_height_m: float, cycle_factor: float, run_weight: float = 0.0
 ) -> StepTiming:
-    """Timing of steps at a pace, walking (``run_share`` 0) to running (1).
+    """Timing of steps at a pace, walking (``run_weight`` 0) to running (1).
 
     Length of a cycle over hip height = 1.346 sqrt(speed over hip height), support = 0.752 cycle - 0.143 s: Inman,
     Ralston and Todd, Human Walking (1981), in the form of Boulic, Magnenat-Thalmann and Thalmann, A global human
@@ -58,8 +58,8 @@ def step_timing(
     cycle_s = float(np.clip(1.346 / np.sqrt(max(pace, 1e-6)), 0.85, 1.6)) * cycle_factor
     support_s = 0.752 * cycle_s - 0.143
     jog_s = (0.76 - 0.03 * (speed_mps - 2.0)) * np.sqrt(hip_height_m / 0.88) * cycle_factor
-    cycle_s += run_share * (jog_s - cycle_s)
-    support_s += run_share * (float(np.clip(0.42 - 0.06 * (speed_mps - 2.0), 0.3, 0.44)) * jog_s - support_s)
+    cycle_s += run_weight * (jog_s - cycle_s)
+    support_s += run_weight * (float(np.clip(0.42 - 0.06 * (speed_mps - 2.0), 0.3, 0.44)) * jog_s - support_s)
     return StepTiming(cycle_s, support_s, cycle_s - support_s)
 
 
@@ -67,7 +67,7 @@ def step_timing(
 class Plant:
     """A foot on the floor: the floor point under its ankle, its yaw, and when it lands and lifts.
 
-    ``dodge_m`` is how far (x, y) the swing that leads here bends aside to pass the other foot; ``run_share`` how much
+    ``dodge_m`` is how far (x, y) the swing that leads here bends aside to pass the other foot; ``run_weight`` how much
     of a running step it ends (0 to 1).
     """
 
@@ -76,7 +76,7 @@ class Plant:
     land_s: float
     lift_s: float
     dodge_m: Float64[np.ndarray, "2"]
-    run_share: float = 0.0
+    run_weight: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -133,8 +133,8 @@ class FootstepPlanner:
         moments_s = time_s + np.linspace(0.0, _PACE_WINDOW_S, 9)
         speed_mps = float(self._path.speed_mps(moments_s).mean())
         turn_rps = float(self._path.turn_rps(moments_s).mean())
-        run_share = float(self._path.run_share(moments_s).mean())
-        return step_timing(speed_mps, turn_rps, self._hip_height_m, self._style.cycle_factor, run_share)
+        run_weight = float(self._path.run_weight(moments_s).mean())
+        return step_timing(speed_mps, turn_rps, self._hip_height_m, self._style.cycle_factor, run_weight)
 
     def _next_side(self, standing: list[Plant], turn: int, land_s: float) -> int | None:
         """The foot to lift now: the one whose turn it is if it has to, else the other if it has to."""
@@ -175,7 +175,7 @@ class FootstepPlanner:
         heading_rad = float(self._path.heading_rad(moment_s)[0])
         walking = float(np.clip(self._path.speed_mps(moment_s)[0] / 0.8, 0.0, 1.0))
         half_m = (1 - walking) * self._style.stand_half_width_m + walking * self._style.walk_half_width_m
-        half_m *= 1.0 - 0.4 * float(self._path.run_share(moment_s)[0])
+        half_m *= 1.0 - 0.4 * float(self._path.run_weight(moment_s)[0])
         outward = 1.0 if side == LEFT else -1.0
         ahead, left = _axes(heading_rad)
         position_m = self._path.position_m(moment_s)[0].copy()
@@ -194,8 +194,8 @@ class FootstepPlanner:
         position_m[:2] += float(np.clip(_LEAST_FOOT_GAP_M - gap_m, 0.0, _FARTHEST_ASIDE_M)) * outward * left
         aside = outward * _axes(0.5 * (old.yaw_rad + yaw_rad))[1]
         dodge_m = _passing_room_m(old.position_m[:2], position_m[:2], other.position_m[:2], aside) * aside
-        run_share = float(self._path.run_share(np.array([lift_s, land_s])).mean())
-        return Plant(self._grounded(position_m, yaw_rad), yaw_rad, land_s, np.inf, dodge_m, run_share)
+        run_weight = float(self._path.run_weight(np.array([lift_s, land_s])).mean())
+        return Plant(self._grounded(position_m, yaw_rad), yaw_rad, land_s, np.inf, dodge_m, run_weight)
 
     def _grounded(self, position_m: Float64[np.ndarray, "3"], yaw_rad: float) -> Float64[np.ndarray, "3"]:
         """The place at the height of the highest floor under the sole."""
@@ -225,9 +225,9 @@ def _passing_room_m(
     aside: Float64[np.ndarray, "2"],
 ) -> float:
     """How far a swing must bend aside, at its middle, to pass the standing foot."""
-    share = np.linspace(0.15, 0.85, 15)
-    offset_m = start_m + share[:, None] * (end_m - start_m) - other_m
+    fraction = np.linspace(0.15, 0.85, 15)
+    offset_m = start_m + fraction[:, None] * (end_m - start_m) - other_m
     beside_m = offset_m @ aside
     along_m = np.sqrt(np.maximum(np.sum(offset_m**2, axis=1) - beside_m**2, 0.0))
     short_m = np.where(along_m < _FOOT_LENGTH_M, np.maximum(_PASSING_GAP_M - beside_m, 0.0), 0.0)
-    return float(np.clip(np.max(short_m / np.sin(np.pi * share) ** 2), 0.0, 0.2))
+    return float(np.clip(np.max(short_m / np.sin(np.pi * fraction) ** 2), 0.0, 0.2))

@@ -1,4 +1,4 @@
-"""What a person looks and points at: what a pause is about, or a thing that words name."""
+"""What a person looks and points at: what a pause is about, or an object that words name."""
 
 from dataclasses import dataclass
 
@@ -29,15 +29,15 @@ _WORTH_POINTING_AT = frozenset(
         "wardrobe",
     )
 )
-# A thing is pointed at from within these angles of straight ahead: to the arm's own side and to the other.
+# An object is pointed at from within these angles of straight ahead: to the arm's own side and to the other.
 _OWN_SIDE_RAD, _OTHER_SIDE_RAD = 1.3, 0.3
 
 
 @dataclass(frozen=True)
 class Gaze:
-    """Where something of interest is, relative to the heading; ``share`` (0 to 1) is how much it is looked at."""
+    """Where something of interest is, relative to the heading; ``weight`` (0 to 1) is how much it is looked at."""
 
-    share: Float64[np.ndarray, " N"]
+    weight: Float64[np.ndarray, " N"]
     yaw_rad: Float64[np.ndarray, " N"]
     pitch_rad: Float64[np.ndarray, " N"]
 
@@ -50,33 +50,33 @@ def dwell_gaze(
     time_s: Float64[np.ndarray, " N"],
 ) -> Gaze:
     """Looking at what each pause of a route is about; nobody looks at the seat they sit on."""
-    share, yaw_rad, pitch_rad = (np.zeros(len(time_s)) for _ in range(3))
+    weight, yaw_rad, pitch_rad = (np.zeros(len(time_s)) for _ in range(3))
     for dwell in route.dwells:
         if dwell.purpose == "sit":
             continue
         start_s, end_s = dwell.first_frame / fps - _EARLY_S, dwell.last_frame / fps
         look = smoothstep((time_s - start_s) / _TURN_S) * (1.0 - smoothstep((time_s - end_s + _TURN_S) / _TURN_S))
         one_yaw_rad, one_pitch_rad = _towards(np.array(dwell.target_m), eye_m, heading_rad)
-        stronger = look > share
-        share, yaw_rad, pitch_rad = (
+        stronger = look > weight
+        weight, yaw_rad, pitch_rad = (
             np.where(stronger, new, old)
-            for new, old in ((look, share), (one_yaw_rad, yaw_rad), (one_pitch_rad, pitch_rad))
+            for new, old in ((look, weight), (one_yaw_rad, yaw_rad), (one_pitch_rad, pitch_rad))
         )
     # What is behind cannot be looked at without turning round.
-    share = share * (1.0 - smoothstep((np.abs(yaw_rad) - 1.6) / 0.6))
+    weight = weight * (1.0 - smoothstep((np.abs(yaw_rad) - 1.6) / 0.6))
     return Gaze(
-        share,
+        weight,
         np.clip(yaw_rad, -_FARTHEST_RAD, _FARTHEST_RAD),
         np.clip(pitch_rad, -_STEEPEST_RAD, _STEEPEST_RAD),
     )
 
 
 def aim_m(route: Route, room: Room, fps: float, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, "N 3"]:
-    """What is pointed at over time: what the nearest pause is about, else a thing that the words name, or one like it.
+    """What is pointed at over time, in the world; NaN where there is nothing.
 
-    NaN where there is nothing.
+    It is what the nearest pause is about, else an object that the words name, or one like it.
     """
-    target_m = np.tile(_thing_m(route, room), (len(time_s), 1))
+    target_m = np.tile(_object_m(route, room), (len(time_s), 1))
     looks = [dwell for dwell in route.dwells if dwell.purpose == "look"]
     if looks:
         middles_s = np.array([0.5 * (dwell.first_frame + dwell.last_frame) / fps for dwell in looks])
@@ -85,7 +85,7 @@ def aim_m(route: Route, room: Room, fps: float, time_s: Float64[np.ndarray, " N"
     return np.asarray(target_m, np.float64)
 
 
-def aim_share(
+def aim_weight(
     side: str,
     target_m: Float64[np.ndarray, "N 3"],
     eye_m: Float64[np.ndarray, "N 3"],
@@ -98,15 +98,15 @@ def aim_share(
     return 1.0 - smoothstep(too_far)
 
 
-def _thing_m(route: Route, room: Room) -> Float64[np.ndarray, "3"]:
+def _object_m(route: Route, room: Room) -> Float64[np.ndarray, "3"]:
     stems = mentioned_words(route.description)
     middle_m = route.position_m[len(route.position_m) // 2]
-    solid = [thing for thing in room.objects if not thing.walkable and len(thing.mesh.vertices_m) > 0]
-    named = [thing for thing in solid if names(stems, thing.category)]
-    chosen = named or [thing for thing in solid if thing.category in _WORTH_POINTING_AT]
+    solid = [obj for obj in room.objects if not obj.walkable and len(obj.mesh.vertices_m) > 0]
+    named = [obj for obj in solid if names(stems, obj.category)]
+    chosen = named or [obj for obj in solid if obj.category in _WORTH_POINTING_AT]
     if not chosen:
         return np.full(3, np.nan)
-    centres_m = np.array([0.5 * (thing.mesh.vertices_m.min(0) + thing.mesh.vertices_m.max(0)) for thing in chosen])
+    centres_m = np.array([0.5 * (obj.mesh.vertices_m.min(0) + obj.mesh.vertices_m.max(0)) for obj in chosen])
     return np.asarray(centres_m[np.linalg.norm(centres_m - middle_m, axis=1).argmin()])
 
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
+from perpetua.motion.action_timeline import TimedAction
 from perpetua.motion.arms import Arm, arm_length_m, hanging_arm, pose_wrist, reaching_arm
 from perpetua.motion.hands import finger_rotations
-from perpetua.motion.performance import Act
 from perpetua.motion.style import GaitStyle
 from perpetua.motion.vocabulary import HandPose
 from perpetua.scene.actor import Skeleton
@@ -25,7 +25,7 @@ class Limbs:
     ``lead_m`` is how far the foot of the other side is ahead, ``run`` goes from walking (0) to running (1), ``seated``
     from standing (0) to sitting (1); ``lean_rad`` is how far actions and a seat lean the trunk forward. ``thigh`` is
     where a wrist rests on the thigh and ``aim`` where the pointing wrist is, both from the shoulder in the chest's axes
-    (forward, outward, up), lengths of the arm; ``aim_share`` is 0 where there is nothing to point at.
+    (forward, outward, up), lengths of the arm; ``aim_weight`` is 0 where there is nothing to point at.
     """
 
     lead_m: Float64[np.ndarray, " N"]
@@ -34,7 +34,7 @@ class Limbs:
     lean_rad: Float64[np.ndarray, " N"]
     thigh: Float64[np.ndarray, "N 3"]
     aim: Float64[np.ndarray, "N 3"]
-    aim_share: Float64[np.ndarray, " N"]
+    aim_weight: Float64[np.ndarray, " N"]
 
 
 def make_arm(
@@ -43,7 +43,7 @@ def make_arm(
     style: GaitStyle,
     arm_swing: float,
     limbs: Limbs,
-    act: Act | None,
+    timed: TimedAction | None,
     shrug_rad: Float64[np.ndarray, " N"],
 ) -> Arm:
     """One arm over time.
@@ -54,7 +54,7 @@ def make_arm(
         style: personal habits.
         arm_swing: how far arms swing, as a factor.
         limbs: what the arm goes along with.
-        act: the action that has this arm.
+        timed: the action that has this arm.
         shrug_rad: how far the shoulder is raised.
     """
     arm = _swinging(side, style, arm_swing, limbs)
@@ -62,25 +62,25 @@ def make_arm(
     if limbs.seated.any():
         resting = reaching_arm(side, skeleton, _ON_THIGH, limbs.thigh, still)
         arm = arm.blended(resting, limbs.seated**2)
-    if act is not None:
-        arm = _acting(side, skeleton, arm, limbs, act)
+    if timed is not None:
+        arm = _posed(side, skeleton, arm, limbs, timed)
     return arm.shrugged(side, shrug_rad) if shrug_rad.any() else arm
 
 
 def make_fingers(
-    left: Act | None, right: Act | None, run: Float64[np.ndarray, " N"]
+    left: TimedAction | None, right: TimedAction | None, run: Float64[np.ndarray, " N"]
 ) -> Float64[np.ndarray, "N 30 3 3"]:
     """The fingers of both hands: relaxed, half a fist when running, or as actions shape them."""
-    shapes, shares = [], []
-    for act, side in ((left, "left"), (right, "right")):
-        pose = _pose(act, side)
-        if act is None or pose is None or pose.fingers == "relaxed":
+    shapes, weights = [], []
+    for timed, side in ((left, "left"), (right, "right")):
+        pose = _pose(timed, side)
+        if timed is None or pose is None or pose.fingers == "relaxed":
             shapes.append("fist")
-            shares.append(0.5 * run)
+            weights.append(0.5 * run)
         else:
             shapes.append(pose.fingers)
-            shares.append(np.ones(len(run)) if act.action.between is not None else act.share)
-    return finger_rotations((shapes[0], shapes[1]), (shares[0], shares[1]))
+            weights.append(np.ones(len(run)) if timed.action.between is not None else timed.weight)
+    return finger_rotations((shapes[0], shapes[1]), (weights[0], weights[1]))
 
 
 def wrist_from(
@@ -96,10 +96,10 @@ def wrist_from(
     return np.asarray(away_m * outward / arm_length_m(skeleton, side))
 
 
-def _pose(act: Act | None, side: str) -> HandPose | None:
-    if act is None:
+def _pose(timed: TimedAction | None, side: str) -> HandPose | None:
+    if timed is None:
         return None
-    return act.action.left if side == "left" else act.action.right
+    return timed.action.left if side == "left" else timed.action.right
 
 
 def _swinging(side: str, style: GaitStyle, arm_swing: float, limbs: Limbs) -> Arm:
@@ -111,17 +111,17 @@ def _swinging(side: str, style: GaitStyle, arm_swing: float, limbs: Limbs) -> Ar
     return hanging_arm(side, forward_rad, style.arm_abduction_rad, bend_rad)
 
 
-def _acting(side: str, skeleton: Skeleton, arm: Arm, limbs: Limbs, act: Act) -> Arm:
-    pose = _pose(act, side)
+def _posed(side: str, skeleton: Skeleton, arm: Arm, limbs: Limbs, timed: TimedAction) -> Arm:
+    pose = _pose(timed, side)
     if pose is None:
         return arm
-    beat = act.left_beat if side == "left" else act.right_beat
+    beat = timed.left_beat if side == "left" else timed.right_beat
     # A held hand still bobs a little with the steps.
     bob = np.stack([0.02 * limbs.lead_m, np.zeros_like(limbs.lead_m), 0.01 * limbs.lead_m**2], axis=1)
-    if act.action.between is not None:
-        between = act.action.between
+    if timed.action.between is not None:
+        between = timed.action.between
         arm = reaching_arm(side, skeleton, between, pose_wrist(between, np.zeros_like(beat)) + bob, np.zeros_like(beat))
-    share, wrist = act.share, pose_wrist(pose, beat) + bob
-    if act.action.aims:
-        share, wrist = share * limbs.aim_share, limbs.aim + bob
-    return arm.blended(reaching_arm(side, skeleton, pose, wrist, beat), share)
+    weight, wrist = timed.weight, pose_wrist(pose, beat) + bob
+    if timed.action.aims:
+        weight, wrist = weight * limbs.aim_weight, limbs.aim + bob
+    return arm.blended(reaching_arm(side, skeleton, pose, wrist, beat), weight)

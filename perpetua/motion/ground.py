@@ -15,7 +15,7 @@ class Ground:
     """Heights of a room's walkable surfaces."""
 
     def __init__(self, room: Room) -> None:
-        self._caster = Caster(join([_upper(thing.mesh) for thing in room.objects if thing.walkable]))
+        self._caster = Caster(join([_upper(obj.mesh) for obj in room.objects if obj.walkable]))
 
     def height_m(
         self, place_m: Float64[np.ndarray, "N 2"], expected_m: Float64[np.ndarray, " N"]

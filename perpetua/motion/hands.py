@@ -20,13 +20,13 @@ _SHAPES: dict[str, tuple[tuple[float, float, float], ...]] = {
 
 
 def finger_rotations(
-    shapes: tuple[str, str], shares: tuple[Float64[np.ndarray, " N"], Float64[np.ndarray, " N"]]
+    shapes: tuple[str, str], weights: tuple[Float64[np.ndarray, " N"], Float64[np.ndarray, " N"]]
 ) -> Float64[np.ndarray, "N 30 3 3"]:
-    """Rotations of the finger joints, left hand first, where each hand goes from relaxed (share 0) to a shape (1)."""
-    count = len(shares[0])
+    """Rotations of the finger joints, left hand first, where each hand goes from relaxed (weight 0) to a shape (1)."""
+    count = len(weights[0])
     turns = np.zeros((count, 30, 3))
-    for hand, (shape, share) in enumerate(zip(shapes, shares, strict=True)):
-        bend_rad = np.array(_RELAXED) + share[:, None, None] * (np.array(_SHAPES[shape]) - np.array(_RELAXED))
+    for hand, (shape, weight) in enumerate(zip(shapes, weights, strict=True)):
+        bend_rad = np.array(_RELAXED) + weight[:, None, None] * (np.array(_SHAPES[shape]) - np.array(_RELAXED))
         # Fingers of the left hand point to +Y with the palm down; they close about X, the thumb about Z and Y.
         sign = -1.0 if hand == 0 else 1.0
         joints = slice(15 * hand, 15 * hand + 12)

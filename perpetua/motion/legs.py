@@ -13,7 +13,7 @@ from perpetua.scene.actor import Skeleton
 
 SIDES = ("left", "right")
 # A knee keeps about nine degrees of bend.
-_REACH_SHARE = 0.9965
+_REACH_FRACTION = 0.9965
 # The pelvis comes down before a leg is fully stretched, so that it never has to jerk.
 WALKING_FORESIGHT_S = 0.09
 
@@ -29,7 +29,7 @@ class Leg:
     @property
     def reach_m(self) -> float:
         """Farthest distance from hip to ankle that is used."""
-        return _REACH_SHARE * float(np.linalg.norm(self.thigh_m) + np.linalg.norm(self.shin_m))
+        return _REACH_FRACTION * float(np.linalg.norm(self.thigh_m) + np.linalg.norm(self.shin_m))
 
 
 def leg_of(skeleton: Skeleton, side: str) -> Leg:

@@ -68,7 +68,7 @@ class RoutePath:
         """Speed over the floor, smoothed over about a quarter of a second."""
         return np.interp(time_s, self._grid_s, self._speed_mps)
 
-    def run_share(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+    def run_weight(self, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
         """From 0 (walking) to 1 (running)."""
         return smoothstep((self.speed_mps(time_s) - _RUN_FROM_MPS) / (_RUN_FULLY_MPS - _RUN_FROM_MPS))
 

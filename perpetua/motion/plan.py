@@ -1,6 +1,6 @@
 """The motion of every actor along its route."""
 
-from perpetua.motion.clearing import clear_arms
+from perpetua.motion.arm_avoidance import clear_arms
 from perpetua.motion.config import MotionConfig
 from perpetua.motion.source import MOTION_SOURCES
 from perpetua.scene.actor import BodyMotion, Route, Skeleton

@@ -9,18 +9,19 @@ import numpy as np
 from jaxtyping import Bool, Float64
 from scipy.ndimage import gaussian_filter1d
 
-from perpetua.motion.actions import Performance, perform
-from perpetua.motion.bounce import nominal_height_m
+from perpetua.motion.action_timeline import ActionTimeline, TimedAction, draw_timeline
+from perpetua.motion.actions import DescribedMotion, read_description
+from perpetua.motion.clock import Clock, make_clock
 from perpetua.motion.config import MotionConfig
 from perpetua.motion.feet import FootTrack, foot_track
 from perpetua.motion.footsteps import FootstepPlanner, Plant
-from perpetua.motion.gaze import aim_m, aim_share, dwell_gaze
+from perpetua.motion.gaze import aim_m, aim_weight, dwell_gaze
 from perpetua.motion.gesturing import Limbs, make_arm, make_fingers, wrist_from
 from perpetua.motion.ground import Ground
+from perpetua.motion.hip_height import nominal_height_m
 from perpetua.motion.kinematics import bone, joint_index
 from perpetua.motion.legs import SIDES, foot_of, leg_of, pelvis_heights_m, solve_leg
 from perpetua.motion.path import RoutePath
-from perpetua.motion.performance import Act, Score, draw_score
 from perpetua.motion.rotations import about_y, about_z, blend, rotate
 from perpetua.motion.sitting import (
     Sitting,
@@ -28,21 +29,18 @@ from perpetua.motion.sitting import (
     pelvis_tilt_rad,
     plan_sittings,
     raised_heels,
-    seated_share,
+    seated_weight,
     sitting_lean_rad,
     stepped_back,
     without_failed_sits,
 )
-from perpetua.motion.steering import low_obstacles, steered
 from perpetua.motion.style import GaitStyle, draw_gait_style
+from perpetua.motion.swing_avoidance import low_obstacles, steered
 from perpetua.motion.trunk import Poise, Trunk, make_trunk, spine_between
 from perpetua.scene.actor import BODY_JOINTS, BodyMotion, Route, Skeleton
 from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
 
-_FINE_HZ = 120.0
-# Filters over time see this much of what comes before the first and after the last frame.
-_FILTER_MARGIN_S = 0.8
 _TAKEN_ALONG_M, _RUNNING_FORESIGHT_S = 0.12, 0.03
 # From the thigh's bone up to a wrist that rests on it, and how far along the thigh.
 _WRIST_OVER_THIGH_M, _ALONG_THIGH = 0.105, 0.62
@@ -56,21 +54,11 @@ class _Walker:
 
     skeleton: Skeleton
     style: GaitStyle
-    performance: Performance
+    described: DescribedMotion
     route: Route
     path: RoutePath
     sittings: tuple[Sitting, ...]
     room: Room
-
-
-@dataclass(frozen=True)
-class _Clock:
-    """Evenly spaced times around the frames, and where the frames are among them."""
-
-    fps: float
-    time_s: Float64[np.ndarray, " N"]
-    step_s: float
-    at_frames: slice
 
 
 @dataclass(frozen=True)
@@ -92,22 +80,22 @@ class ProceduralMotion:
     ) -> BodyMotion:
         """See ``MotionSource.make``."""
         walker = _walker(route, skeleton, room, fps, seed)
-        clock = _clock(len(route.heading_rad), fps)
+        clock = make_clock(len(route.heading_rad), fps)
         stride = _stride(walker, seed.stream("steps", route.actor), clock)
-        score = _score(walker, seed.stream("actions", route.actor), clock)
-        trunk = _trunk(walker, stride, score, clock)
-        pelvis_m = _pelvis_m(walker, trunk, stride, score, clock)
+        timeline = _timeline(walker, seed.stream("actions", route.actor), clock)
+        trunk = _trunk(walker, stride, timeline, clock)
+        pelvis_m = _pelvis_m(walker, trunk, stride, timeline, clock)
         rotations = _trunk_rotations(trunk)
         reached = [
             _enter_leg(rotations, side, walker, track, pelvis_m, trunk)
             for side, track in zip(SIDES, stride.tracks, strict=True)
         ]
-        acts = (_act_of(score, SIDES[0]), _act_of(score, SIDES[1]))
-        for side, act in zip(SIDES, acts, strict=True):
-            _enter_arm(rotations, side, walker, pelvis_m, stride, score, act, clock)
+        actions = (_action_of(timeline, SIDES[0]), _action_of(timeline, SIDES[1]))
+        for side, timed in zip(SIDES, actions, strict=True):
+            _enter_arm(rotations, side, walker, pelvis_m, stride, timeline, timed, clock)
         at = clock.at_frames
         world_from_joint = np.stack([rotations[name] for name in BODY_JOINTS], axis=1)
-        fingers = make_fingers(acts[0], acts[1], walker.path.run_share(clock.time_s))
+        fingers = make_fingers(actions[0], actions[1], walker.path.run_weight(clock.time_s))
         return BodyMotion(
             route.actor,
             fps,
@@ -124,18 +112,10 @@ def _walker(route: Route, skeleton: Skeleton, room: Room, fps: float, seed: Stag
     sittings = plan_sittings(route, skeleton, room, fps)
     told = without_failed_sits(route, sittings, fps)
     path = RoutePath(stepped_back(told, sittings, fps), fps)
-    return _Walker(skeleton, style, perform(route.description), told, path, sittings, room)
+    return _Walker(skeleton, style, read_description(route.description), told, path, sittings, room)
 
 
-def _clock(frames: int, fps: float) -> _Clock:
-    fine = max(1, int(np.ceil(_FINE_HZ / fps)))
-    margin = int(np.ceil(_FILTER_MARGIN_S * fps)) * fine
-    count = (frames - 1) * fine + 1
-    time_s = (np.arange(count + 2 * margin) - margin) / (fps * fine)
-    return _Clock(fps, time_s, 1.0 / (fps * fine), slice(margin, margin + count, fine))
-
-
-def _stride(walker: _Walker, rng: np.random.Generator, clock: _Clock) -> _Stride:
+def _stride(walker: _Walker, rng: np.random.Generator, clock: Clock) -> _Stride:
     left, right = (foot_of(walker.skeleton, side) for side in SIDES)
     leg = leg_of(walker.skeleton, "left")
     hip_height_m = float(left.ankle_height_m - (leg.thigh_m + leg.shin_m)[2])
@@ -151,23 +131,23 @@ def _stride(walker: _Walker, rng: np.random.Generator, clock: _Clock) -> _Stride
     return _Stride(plants, (tracks[0], tracks[1]))
 
 
-def _score(walker: _Walker, rng: np.random.Generator, clock: _Clock) -> Score:
-    return draw_score(
-        walker.performance,
+def _timeline(walker: _Walker, rng: np.random.Generator, clock: Clock) -> ActionTimeline:
+    return draw_timeline(
+        walker.described,
         walker.path.stillness(clock.time_s),
-        seated_share(walker.sittings, clock.time_s),
+        seated_weight(walker.sittings, clock.time_s),
         clock.time_s,
         rng,
     )
 
 
-def _trunk(walker: _Walker, stride: _Stride, score: Score, clock: _Clock) -> Trunk:
+def _trunk(walker: _Walker, stride: _Stride, timeline: ActionTimeline, clock: Clock) -> Trunk:
     time_s = clock.time_s
     eye_m = _eye_m(walker, clock)
     poise = Poise(
-        score,
+        timeline,
         dwell_gaze(walker.route, clock.fps, eye_m, walker.path.heading_rad(time_s), time_s),
-        seated_share(walker.sittings, time_s),
+        seated_weight(walker.sittings, time_s),
         sitting_lean_rad(walker.sittings, time_s),
         pelvis_tilt_rad(walker.sittings, time_s),
     )
@@ -175,12 +155,12 @@ def _trunk(walker: _Walker, stride: _Stride, score: Score, clock: _Clock) -> Tru
     return make_trunk(walker.path, walker.style, poise, stride.tracks, lead_m, time_s)
 
 
-def _eye_m(walker: _Walker, clock: _Clock) -> Float64[np.ndarray, "N 3"]:
+def _eye_m(walker: _Walker, clock: Clock) -> Float64[np.ndarray, "N 3"]:
     head_m = float(walker.skeleton.joint_m[joint_index("head"), 2] - walker.skeleton.contact_m[:, 2].min())
     return walker.path.position_m(clock.time_s) + np.array([0.0, 0.0, head_m + 0.06])
 
 
-def _lead_m(walker: _Walker, foot: FootTrack, other: FootTrack, clock: _Clock) -> Float64[np.ndarray, " N"]:
+def _lead_m(walker: _Walker, foot: FootTrack, other: FootTrack, clock: Clock) -> Float64[np.ndarray, " N"]:
     """How far a foot is ahead of the other along the heading."""
     heading_rad = walker.path.heading_rad(clock.time_s)
     apart_m = foot.ankle_m - other.ankle_m
@@ -188,18 +168,18 @@ def _lead_m(walker: _Walker, foot: FootTrack, other: FootTrack, clock: _Clock) -
 
 
 def _pelvis_m(
-    walker: _Walker, trunk: Trunk, stride: _Stride, score: Score, clock: _Clock
+    walker: _Walker, trunk: Trunk, stride: _Stride, timeline: ActionTimeline, clock: Clock
 ) -> Float64[np.ndarray, "N 3"]:
     legs = (leg_of(walker.skeleton, "left"), leg_of(walker.skeleton, "right"))
     standing_m = nominal_height_m(
-        walker.path, walker.skeleton, stride.plants, legs[0].reach_m, score.drop, clock.time_s
+        walker.path, walker.skeleton, stride.plants, legs[0].reach_m, timeline.drop, clock.time_s
     )
     pelvis_m = np.column_stack([trunk.pelvis_xy_m, standing_m])
     pelvis_m = lowered_pelvis(walker.sittings, pelvis_m, trunk.world_from_pelvis, walker.skeleton, clock.time_s)
     ankles_m = (stride.tracks[0].ankle_m, stride.tracks[1].ankle_m)
     reaching = (pelvis_m[:, 2], pelvis_m[:, :2], trunk.world_from_pelvis, legs, ankles_m, clock.step_s)
     height_m = pelvis_heights_m(*reaching)
-    run = walker.path.run_share(clock.time_s)
+    run = walker.path.run_weight(clock.time_s)
     if run.any():
         # Runners bounce faster than walkers ease their hips down, and their feet in the air are taken along.
         slack_m = (_TAKEN_ALONG_M * run * ~stride.tracks[0].on_floor, _TAKEN_ALONG_M * run * ~stride.tracks[1].on_floor)
@@ -239,9 +219,9 @@ def _enter_leg(
     return np.asarray(np.linalg.norm(bones.end_m - track.ankle_m, axis=1) < 1e-6)
 
 
-def _act_of(score: Score, side: str) -> Act | None:
-    """The act that has an arm."""
-    return next((act for act in score.acts if getattr(act.action, side) is not None), None)
+def _action_of(timeline: ActionTimeline, side: str) -> TimedAction | None:
+    """The action that has an arm."""
+    return next((timed for timed in timeline.actions if getattr(timed.action, side) is not None), None)
 
 
 def _enter_arm(
@@ -250,13 +230,13 @@ def _enter_arm(
     walker: _Walker,
     pelvis_m: Float64[np.ndarray, "N 3"],
     stride: _Stride,
-    score: Score,
-    act: Act | None,
-    clock: _Clock,
+    timeline: ActionTimeline,
+    timed: TimedAction | None,
+    clock: Clock,
 ) -> None:
     """Adds an arm's rotations."""
-    limbs = _limbs(rotations, side, walker, pelvis_m, stride, score, clock)
-    arm = make_arm(side, walker.skeleton, walker.style, walker.performance.arm_swing, limbs, act, score.shrug_rad)
+    limbs = _limbs(rotations, side, walker, pelvis_m, stride, timeline, clock)
+    arm = make_arm(side, walker.skeleton, walker.style, walker.described.arm_swing, limbs, timed, timeline.shrug_rad)
     rotations[f"{side}_collar"] = rotations["spine3"] @ arm.collar
     rotations[f"{side}_shoulder"] = rotations[f"{side}_collar"] @ arm.shoulder
     rotations[f"{side}_elbow"] = rotations[f"{side}_shoulder"] @ arm.elbow
@@ -269,8 +249,8 @@ def _limbs(
     walker: _Walker,
     pelvis_m: Float64[np.ndarray, "N 3"],
     stride: _Stride,
-    score: Score,
-    clock: _Clock,
+    timeline: ActionTimeline,
+    clock: Clock,
 ) -> Limbs:
     skeleton, time_s = walker.skeleton, clock.time_s
     here = SIDES.index(side)
@@ -288,12 +268,12 @@ def _limbs(
     aim = wrist_from(side, skeleton, target_m, shoulder_m, chest)
     return Limbs(
         gaussian_filter1d(lead_m, 0.06 / clock.step_s),
-        walker.path.run_share(time_s),
-        seated_share(walker.sittings, time_s),
-        score.lean_rad - walker.performance.lean_rad + sitting_lean_rad(walker.sittings, time_s),
+        walker.path.run_weight(time_s),
+        seated_weight(walker.sittings, time_s),
+        timeline.lean_rad - walker.described.lean_rad + sitting_lean_rad(walker.sittings, time_s),
         wrist_from(side, skeleton, thigh_m, shoulder_m, chest),
         0.95 * aim / np.maximum(np.linalg.norm(aim, axis=1, keepdims=True), 1e-6),
-        aim_share(side, target_m, eye_m, heading_rad),
+        aim_weight(side, target_m, eye_m, heading_rad),
     )
 
 

@@ -27,11 +27,11 @@ def _about(axis: int, angle_rad: Float64[np.ndarray, " N"]) -> Float64[np.ndarra
 
 
 def blend(
-    start: Float64[np.ndarray, "N 3 3"], end: Float64[np.ndarray, "N 3 3"], share: float | Float64[np.ndarray, " N"]
+    start: Float64[np.ndarray, "N 3 3"], end: Float64[np.ndarray, "N 3 3"], weight: float | Float64[np.ndarray, " N"]
 ) -> Float64[np.ndarray, "N 3 3"]:
-    """Rotations a share of the way (0 to 1) from ``start`` to ``end`` along the shortest turn."""
+    """Rotations a fraction of the way (0 to 1) from ``start`` to ``end`` along the shortest turn."""
     turn = Rotation.from_matrix(np.swapaxes(start, 1, 2) @ end).as_rotvec()
-    return np.asarray(start @ Rotation.from_rotvec(np.reshape(share, (-1, 1)) * turn).as_matrix())
+    return np.asarray(start @ Rotation.from_rotvec(np.reshape(weight, (-1, 1)) * turn).as_matrix())
 
 
 def rotate(rotation: Float64[np.ndarray, "N 3 3"], vector: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "N 3"]:
@@ -49,7 +49,7 @@ def frames_along(
     return np.stack([first, second, np.cross(first, second)], axis=2)
 
 
-def smoothstep(share: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+def smoothstep(weight: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
     """From 0 to 1 without corners, and constant beyond."""
-    inside = np.clip(share, 0.0, 1.0)
+    inside = np.clip(weight, 0.0, 1.0)
     return np.clip(inside**3 * (10.0 - 15.0 * inside + 6.0 * inside**2), 0.0, 1.0)

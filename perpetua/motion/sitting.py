@@ -24,9 +24,9 @@ logger = logging.getLogger(__name__)
 DOWN_S, UP_S = 1.2, 1.05
 _SETTLE_S, _LEAST_REST_S, _BACK_STEP_MPS, _LEAST_BACK_S = 0.14, 0.3, 0.45, 0.4
 # Flesh between the hip joints and the seat, in lengths of the thigh, where the body does not say.
-_FLESH_SHARE = 0.235
+_FLESH_FRACTION = 0.235
 # Under the thigh there is less of it, and a cushion gives way by so much.
-_THIGH_SHARE, _GIVE_M = 0.85, 0.003
+_THIGH_FRACTION, _GIVE_M = 0.85, 0.003
 # Skirts that hang lower than this would hang through the seat.
 _MOST_FLESH_M = 0.125
 # From the hip joints back to the back of the body, and from ankle to heel with a little room.
@@ -83,7 +83,7 @@ def plan_sittings(route: Route, skeleton: Skeleton, room: Room, fps: float) -> t
     wanted = [dwell for dwell in route.dwells if dwell.purpose == "sit"]
     if not wanted:
         return ()
-    caster = Caster(join([thing.mesh for thing in room.objects]))
+    caster = Caster(join([obj.mesh for obj in room.objects]))
     planned = []
     for dwell in wanted:
         sitting = _plan(dwell, route, skeleton, caster, fps)
@@ -111,22 +111,22 @@ def stepped_back(route: Route, sittings: tuple[Sitting, ...], fps: float) -> Rou
     position_m, heading_rad = route.position_m.copy(), route.heading_rad.copy()
     time_s = np.arange(len(heading_rad)) / fps
     for sitting in sittings:
-        share = _stepping(sitting, time_s)
-        position_m[:, :2] += share[:, None] * (sitting.spot_m - position_m[:, :2])
+        weight = _stepping(sitting, time_s)
+        position_m[:, :2] += weight[:, None] * (sitting.spot_m - position_m[:, :2])
         turn_rad = (sitting.facing_rad - heading_rad + np.pi) % (2.0 * np.pi) - np.pi
-        heading_rad += share * turn_rad
+        heading_rad += weight * turn_rad
     return replace(route, position_m=position_m, heading_rad=heading_rad)
 
 
-def seated_share(sittings: tuple[Sitting, ...], time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+def seated_weight(sittings: tuple[Sitting, ...], time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
     """From 0 (standing) to 1 (sitting)."""
-    share = np.zeros(len(time_s))
+    weight = np.zeros(len(time_s))
     for sitting in sittings:
-        share = np.maximum(share, one_seated_share(sitting, time_s))
-    return share
+        weight = np.maximum(weight, one_seated_weight(sitting, time_s))
+    return weight
 
 
-def one_seated_share(sitting: Sitting, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+def one_seated_weight(sitting: Sitting, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
     """From 0 (standing) to 1 (on this seat)."""
     return smoothstep((time_s - sitting.down_s) / DOWN_S) * (1.0 - smoothstep((time_s - sitting.rise_s) / UP_S))
 
@@ -139,15 +139,15 @@ def sitting_lean_rad(sittings: tuple[Sitting, ...], time_s: Float64[np.ndarray, 
             (sitting.down_s - 0.1, DOWN_S + 0.2, _LEAN_DOWN_RAD),
             (sitting.rise_s - 0.25, UP_S + 0.35, _LEAN_UP_RAD),
         ):
-            share = np.clip((time_s - start_s) / duration_s, 0.0, 1.0)
-            lean_rad += most_rad * np.sin(np.pi * share) ** 2
-        lean_rad += sitting.lean_rad * one_seated_share(sitting, time_s) ** 2
+            weight = np.clip((time_s - start_s) / duration_s, 0.0, 1.0)
+            lean_rad += most_rad * np.sin(np.pi * weight) ** 2
+        lean_rad += sitting.lean_rad * one_seated_weight(sitting, time_s) ** 2
     return lean_rad
 
 
 def pelvis_tilt_rad(sittings: tuple[Sitting, ...], time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
     """How far the pelvis rolls back on the seat (negative)."""
-    return _PELVIS_TILT_RAD * seated_share(sittings, time_s) ** 3
+    return _PELVIS_TILT_RAD * seated_weight(sittings, time_s) ** 3
 
 
 def lowered_pelvis(
@@ -161,11 +161,11 @@ def lowered_pelvis(
     lowered_m = pelvis_m.copy()
     hips_m = 0.5 * (bone(skeleton, "pelvis", "left_hip") + bone(skeleton, "pelvis", "right_hip"))
     for sitting in sittings:
-        share = one_seated_share(sitting, time_s)
+        weight = one_seated_weight(sitting, time_s)
         seated_m = sitting.hip_m - rotate(world_from_pelvis, hips_m)
         # Hips go down before they go back, as a leg reaches no farther.
-        lowered_m[:, :2] += (share**1.4)[:, None] * (seated_m - lowered_m)[:, :2]
-        lowered_m[:, 2] += share * (seated_m - lowered_m)[:, 2]
+        lowered_m[:, :2] += (weight**1.4)[:, None] * (seated_m - lowered_m)[:, :2]
+        lowered_m[:, 2] += weight * (seated_m - lowered_m)[:, 2]
     return lowered_m
 
 
@@ -178,7 +178,7 @@ def raised_heels(
     """The track of a planted foot with its heel raised about the ball while its owner sits on a high seat."""
     pitch_rad = np.zeros(len(time_s))
     for sitting in sittings:
-        pitch_rad += sitting.heel_rad * one_seated_share(sitting, time_s) * track.on_floor
+        pitch_rad += sitting.heel_rad * one_seated_weight(sitting, time_s) * track.on_floor
     if not pitch_rad.any():
         return track
     flat = about_z(track.yaw_rad)
@@ -241,7 +241,7 @@ def _settle(seat: _Seat, standing_m: float, skeleton: Skeleton) -> tuple[Float64
     """Where the hips come to rest, how far the ankles are ahead of them, and how far heels are raised."""
     leg, foot = leg_of(skeleton, "left"), foot_of(skeleton, "left")
     thigh_m, shin_m = float(np.linalg.norm(leg.thigh_m)), float(np.linalg.norm(leg.shin_m))
-    flesh_m = (_FLESH_SHARE * thigh_m if skeleton.seat_m is None else skeleton.seat_m) - _GIVE_M
+    flesh_m = (_FLESH_FRACTION * thigh_m if skeleton.seat_m is None else skeleton.seat_m) - _GIVE_M
     if flesh_m > _MOST_FLESH_M:
         return None
     nearest_back_m = min(distance_m for _, distance_m in seat.backs)
@@ -279,7 +279,7 @@ def _sink_m(
     if knee[0] < edge_m:
         return float("inf")
     bone_m = hip[1] + (knee[1] - hip[1]) * edge_m / knee[0]
-    return float(seat_m - (bone_m - _THIGH_SHARE * flesh_m))
+    return float(seat_m - (bone_m - _THIGH_FRACTION * flesh_m))
 
 
 def _legs_fit(seat: _Seat, hip_m: Float64[np.ndarray, "3"], ahead_m: float, caster: Caster) -> bool:
@@ -328,12 +328,12 @@ def _times_s(
 def _stepping(sitting: Sitting, time_s: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
     """From 0 (on the route) to 1 (on the spot before the seat)."""
     there_s, back_s = sitting.down_s - _SETTLE_S, sitting.rise_s + UP_S + _SETTLE_S
-    share = np.ones(len(time_s))
+    weight = np.ones(len(time_s))
     if sitting.arrive_s < sitting.down_s:
-        share = smoothstep((time_s - sitting.arrive_s) / max(there_s - sitting.arrive_s, 1e-3))
+        weight = smoothstep((time_s - sitting.arrive_s) / max(there_s - sitting.arrive_s, 1e-3))
     if sitting.leave_s > sitting.rise_s:
-        share = share * (1.0 - smoothstep((time_s - back_s) / max(sitting.leave_s - back_s, 1e-3)))
-    return np.asarray(share)
+        weight = weight * (1.0 - smoothstep((time_s - back_s) / max(sitting.leave_s - back_s, 1e-3)))
+    return np.asarray(weight)
 
 
 def _beyond(route: Route, dwell: Dwell) -> tuple[float, float, float]:

@@ -6,15 +6,15 @@ import numpy as np
 from jaxtyping import Float64
 from scipy.ndimage import gaussian_filter1d
 
+from perpetua.motion.action_timeline import ActionTimeline
 from perpetua.motion.feet import FootTrack
 from perpetua.motion.gaze import Gaze
 from perpetua.motion.path import RoutePath
-from perpetua.motion.performance import Score
 from perpetua.motion.rotations import about_x, about_y, about_z, blend
 from perpetua.motion.style import GaitStyle
 
 _RUN_LEAN_RAD = 0.1
-# The pelvis takes this share of the trunk's lean, and the chest of a turn of the eyes.
+# The pelvis takes this fraction of the trunk's lean, and the chest of a turn of the eyes.
 _PELVIS_LEAN, _CHEST_FOLLOWS = 0.5, 0.35
 
 
@@ -36,7 +36,7 @@ class Poise:
     ``lean_rad`` and ``tilt_rad`` are of a sitting body, ``seated`` goes from 0 (on the feet) to 1.
     """
 
-    score: Score
+    timeline: ActionTimeline
     gaze: Gaze
     seated: Float64[np.ndarray, " N"]
     lean_rad: Float64[np.ndarray, " N"]
@@ -62,16 +62,16 @@ def make_trunk(
         time_s: evenly spaced times.
     """
     per_second = 1.0 / (time_s[1] - time_s[0])
-    score = poise.score
+    timeline = poise.timeline
     heading_rad = path.heading_rad(time_s)
-    speed_mps, run = path.speed_mps(time_s), path.run_share(time_s)
+    speed_mps, run = path.speed_mps(time_s), path.run_weight(time_s)
     stillness = path.stillness(time_s)
     idle = _idle_shift(style, time_s) * (1.0 - poise.seated)
     # From -1 (weight on the right foot) to 1 (on the left).
     load = feet[0].on_floor.astype(np.float64) - feet[1].on_floor.astype(np.float64)
     load = gaussian_filter1d(load, 0.13 * per_second) + 0.7 * stillness * idle
     pace = np.clip(speed_mps / 1.2, 0.0, 1.0)
-    sway_m = load * (style.sway_m + 0.014 * (1.0 - pace)) * (1.0 - 0.5 * run) + 0.25 * score.sway_rad
+    sway_m = load * (style.sway_m + 0.014 * (1.0 - pace)) * (1.0 - 0.5 * run) + 0.25 * timeline.sway_rad
     pelvis_xy_m = path.position_m(time_s)[:, :2] + sway_m[:, None] * np.stack(
         [-np.sin(heading_rad), np.cos(heading_rad)], axis=1
     )
@@ -79,17 +79,17 @@ def make_trunk(
     list_rad = style.pelvis_list_rad * load
     push = gaussian_filter1d(path.forward_acceleration_mps2(time_s), 0.2 * per_second)
     lean_rad = style.lean_rad + 0.03 * pace + _RUN_LEAN_RAD * run + np.clip(0.03 * push, -0.08, 0.1)
-    lean_rad = lean_rad * (1.0 - poise.seated) + poise.lean_rad + score.lean_rad
+    lean_rad = lean_rad * (1.0 - poise.seated) + poise.lean_rad + timeline.lean_rad
     breath_rad = 0.006 * np.sin(2.0 * np.pi * time_s / 3.6 + style.idle_phase[2])
     world_from_pelvis = (
         about_z(heading_rad - turn_rad) @ about_y(_PELVIS_LEAN * lean_rad + poise.tilt_rad) @ about_x(list_rad)
     )
-    chest_turn_rad = turn_rad + 0.05 * stillness * idle + score.turn_rad
-    chest_turn_rad += np.clip(_CHEST_FOLLOWS * poise.gaze.share * poise.gaze.yaw_rad, -0.5, 0.5)
+    chest_turn_rad = turn_rad + 0.05 * stillness * idle + timeline.turn_rad
+    chest_turn_rad += np.clip(_CHEST_FOLLOWS * poise.gaze.weight * poise.gaze.yaw_rad, -0.5, 0.5)
     world_from_chest = (
         about_z(heading_rad + chest_turn_rad)
         @ about_y(lean_rad + breath_rad)
-        @ about_x(-0.3 * list_rad + score.sway_rad)
+        @ about_x(-0.3 * list_rad + timeline.sway_rad)
     )
     head = _head(path, style, poise, heading_rad, stillness, time_s)
     return Trunk(heading_rad, pelvis_xy_m, world_from_pelvis, world_from_chest, head)
@@ -120,17 +120,17 @@ def _head(
     time_s: Float64[np.ndarray, " N"],
 ) -> Float64[np.ndarray, "N 3 3"]:
     """Level, and turned to what is looked at, or to where the body will be heading shortly."""
-    score, gaze = poise.score, poise.gaze
+    timeline, gaze = poise.timeline, poise.gaze
     first_s, second_s, third_s = style.idle_period_s
     first, second, third = style.idle_phase
     wander = 0.6 * np.sin(2.0 * np.pi * time_s / (0.6 * first_s) + second)
     wander += 0.4 * np.sin(2.0 * np.pi * time_s / (0.37 * second_s) + third)
     ahead_rad = np.clip(path.heading_rad(time_s + 0.45) - heading_rad, -0.9, 0.9)
-    idle_rad = ahead_rad + score.wander_rad * (1.0 + 0.8 * stillness) * np.tanh(1.5 * wander)
+    idle_rad = ahead_rad + timeline.wander_rad * (1.0 + 0.8 * stillness) * np.tanh(1.5 * wander)
     nod_rad = 0.02 * np.sin(2.0 * np.pi * time_s / (0.5 * third_s) + first)
-    yaw_rad = idle_rad + gaze.share * (gaze.yaw_rad + 0.25 * idle_rad - idle_rad) + score.head_turn_rad
-    pitch_rad = style.gaze_pitch_rad + gaze.share * (gaze.pitch_rad - style.gaze_pitch_rad) + score.head_pitch_rad
+    yaw_rad = idle_rad + gaze.weight * (gaze.yaw_rad + 0.25 * idle_rad - idle_rad) + timeline.head_turn_rad
+    pitch_rad = style.gaze_pitch_rad + gaze.weight * (gaze.pitch_rad - style.gaze_pitch_rad) + timeline.head_pitch_rad
     # A head follows a trunk that bows or leans back, and no neck turns farther than this.
-    pitch_rad += nod_rad + 0.75 * np.maximum(score.lean_rad, 0.0) + 0.4 * np.maximum(poise.lean_rad, 0.0)
+    pitch_rad += nod_rad + 0.75 * np.maximum(timeline.lean_rad, 0.0) + 0.4 * np.maximum(poise.lean_rad, 0.0)
     yaw_rad = heading_rad + np.clip(yaw_rad, -1.3, 1.3)
-    return np.asarray(about_z(yaw_rad) @ about_y(pitch_rad) @ about_x(score.head_tilt_rad))
+    return np.asarray(about_z(yaw_rad) @ about_y(pitch_rad) @ about_x(timeline.head_tilt_rad))

@@ -38,7 +38,7 @@ _LAMP_M = 0.5
 _CELL_M = 0.018
 # Half of the width and depth that has to be flat to sit on, and how flat.
 _HALF_WIDTH_M, _HALF_DEPTH_M = 0.165, 0.12
-_FLATNESS_M, _FLAT_SHARE = 0.045, 0.9
+_FLATNESS_M, _FLAT_FRACTION = 0.045, 0.9
 # Thighs are this wide together; free floor in front of the edge is so deep and so wide.
 _THIGHS_M, _FRONT_DEPTH_M, _FRONT_WIDTH_M = 0.38, 0.42, 0.44
 _FLOOR_M, _STEP_DOWN_M = 0.1, 0.2
@@ -97,17 +97,15 @@ class _Candidates:
 
 def find_seats(room: Room) -> tuple[Seat, ...]:
     """Seats of a room, in the order of its objects: at most three per object, at least 0.6 m apart."""
-    things = [thing for thing in room.objects if thing.category in SEAT_CATEGORIES and len(thing.mesh.faces) > 0]
-    if not things:
+    sittable = [obj for obj in room.objects if obj.category in SEAT_CATEGORIES and len(obj.mesh.faces) > 0]
+    if not sittable:
         return ()
-    caster = Caster(join([thing.mesh for thing in room.objects]))
-    owner_of_face = np.concatenate(
-        [np.full(len(thing.mesh.faces), thing.object_index, np.int64) for thing in room.objects]
-    )
-    floor_m = float(np.median([_floor_m(thing.mesh) for thing in room.objects if thing.walkable] or [0.0]))
+    caster = Caster(join([obj.mesh for obj in room.objects]))
+    owner_of_face = np.concatenate([np.full(len(obj.mesh.faces), obj.object_index, np.int64) for obj in room.objects])
+    floor_m = float(np.median([_floor_m(obj.mesh) for obj in room.objects if obj.walkable] or [0.0]))
     seats: list[Seat] = []
-    for thing in things:
-        seats += _seats_of(thing, _relief(thing, caster, owner_of_face, floor_m, room.height_m), floor_m, seats)
+    for obj in sittable:
+        seats += _seats_of(obj, _relief(obj, caster, owner_of_face, floor_m, room.height_m), floor_m, seats)
     return tuple(seats)
 
 
@@ -116,10 +114,10 @@ def _floor_m(mesh: TriMesh) -> float:
 
 
 def _relief(
-    thing: SceneObject, caster: Caster, owner_of_face: Int64[np.ndarray, " F"], floor_m: float, height_m: float
+    obj: SceneObject, caster: Caster, owner_of_face: Int64[np.ndarray, " F"], floor_m: float, height_m: float
 ) -> _Relief:
     around_m = 0.9
-    low, high = thing.mesh.vertices_m.min(0)[:2] - around_m, thing.mesh.vertices_m.max(0)[:2] + around_m
+    low, high = obj.mesh.vertices_m.min(0)[:2] - around_m, obj.mesh.vertices_m.max(0)[:2] + around_m
     count = np.ceil((high - low) / _CELL_M).astype(int) + 1
     x_m, y_m = np.meshgrid(*(low[axis] + _CELL_M * np.arange(count[axis]) for axis in (0, 1)), indexing="ij")
     heights: list[np.ndarray] = []
@@ -134,13 +132,13 @@ def _relief(
     return _Relief(low, heights[1], maximum_filter(heights[1], 3), tall_m, owner)
 
 
-def _seats_of(thing: SceneObject, relief: _Relief, floor_m: float, taken: list[Seat]) -> list[Seat]:
-    mine = (relief.owner == thing.object_index) & (relief.low_m >= LOWEST_M) & (relief.low_m <= HIGHEST_M)
+def _seats_of(obj: SceneObject, relief: _Relief, floor_m: float, taken: list[Seat]) -> list[Seat]:
+    mine = (relief.owner == obj.object_index) & (relief.low_m >= LOWEST_M) & (relief.low_m <= HIGHEST_M)
     cell = np.argwhere(mine)[::_EVERY]
     if len(cell) == 0:
         return []
     middle_m = np.column_stack([relief.origin_m + _CELL_M * cell, relief.low_m[mine][::_EVERY]])
-    corners = cv2.minAreaRect(thing.mesh.vertices_m[:, :2].astype(np.float32))
+    corners = cv2.minAreaRect(obj.mesh.vertices_m[:, :2].astype(np.float32))
     first_rad = float(np.radians(corners[2]))
     tried = [_candidates(middle_m, relief, first_rad + quarter * 0.5 * np.pi) for quarter in range(4)]
     found: list[Seat] = []
@@ -150,7 +148,7 @@ def _seats_of(thing: SceneObject, relief: _Relief, floor_m: float, taken: list[S
         apart_m = [np.hypot(seat.middle_m[0] - x_m, seat.middle_m[1] - y_m) for seat in (*taken, *found)]
         if len(found) < _PER_OBJECT and all(distance_m >= _SPACING_M for distance_m in apart_m):
             facing_rad = (tried[way].facing_rad + np.pi) % (2.0 * np.pi) - np.pi
-            found.append(Seat(thing.object_index, (x_m, y_m, height_m + floor_m), float(facing_rad), height_m))
+            found.append(Seat(obj.object_index, (x_m, y_m, height_m + floor_m), float(facing_rad), height_m))
     return found
 
 
@@ -158,7 +156,7 @@ def _candidates(middle_m: Float64[np.ndarray, "N 3"], relief: _Relief, facing_ra
     """Those of some places at which a person can sit that faces one way."""
     flat = _heights(relief.low_m, relief, middle_m, facing_rad, _span(_HALF_DEPTH_M), _span(_HALF_WIDTH_M))
     level = np.abs(flat - middle_m[:, 2, None, None]) < _FLATNESS_M
-    good = level.mean(axis=(1, 2)) >= _FLAT_SHARE
+    good = level.mean(axis=(1, 2)) >= _FLAT_FRACTION
     middle_m = middle_m[good]
     edge_m = _edge_m(relief, middle_m, facing_rad)
     back_m = _back_m(relief, middle_m, facing_rad)

@@ -4,7 +4,7 @@ import logging
 
 import pytest
 
-from perpetua.motion.actions import known_actions, perform, stated_paces, wants_seat
+from perpetua.motion.actions import known_actions, read_description, stated_paces, wants_seat
 from perpetua.motion.config import MotionConfig
 from perpetua.motion.plan import make_motions
 from perpetua.motion.vocabulary import ACTIONS
@@ -16,25 +16,25 @@ SEED = StageSeed(5, 0, "motion")
 
 @pytest.mark.parametrize("name", known_actions())
 def test_every_action_understands_its_own_name(name: str, caplog: pytest.LogCaptureFixture) -> None:
-    assert perform(name) != perform("walks")
+    assert read_description(name) != read_description("walks")
     assert not caplog.records
 
 
 def test_verbs_things_and_sides_are_matched_clause_by_clause() -> None:
-    assert perform("walks while waving the right hand").right == perform("waves").right
-    left = perform("waves the left hand, talking on the phone")
+    assert read_description("walks while waving the right hand").right == read_description("waves").right
+    left = read_description("waves the left hand, talking on the phone")
     assert left.left is not None and left.left.left == ACTIONS["wave a hand"].right and left.left.right is None
-    assert left.right == perform("talks on the phone").right
-    both = perform("is carrying a big box and looking around")
+    assert left.right == read_description("talks on the phone").right
+    both = read_description("is carrying a big box and looking around")
     assert both.left is both.right is both.actions[0] and both.actions[1] == ACTIONS["look around"]
-    assert perform("looks at the phone").right != perform("talks on the phone").right
-    assert perform("walks briskly").arm_swing > 1.0 > perform("walks slowly").arm_swing
-    assert perform("carries a grudge") == perform("walks")
+    assert read_description("looks at the phone").right != read_description("talks on the phone").right
+    assert read_description("walks briskly").arm_swing > 1.0 > read_description("walks slowly").arm_swing
+    assert read_description("carries a grudge") == read_description("walks")
 
 
 def test_the_first_said_has_the_arm() -> None:
-    meant = perform("talks on the phone and waves")
-    assert meant.right == perform("talks on the phone").right
+    meant = read_description("talks on the phone and waves")
+    assert meant.right == read_description("talks on the phone").right
     assert meant.actions[1].right is None and meant.actions[1].left is None
 
 
@@ -55,7 +55,7 @@ def test_the_first_said_has_the_arm() -> None:
     ],
 )
 def test_free_words_find_their_action(words: str, name: str) -> None:
-    assert [action.verbs for action in perform(words).actions] == [ACTIONS[name].verbs]
+    assert [action.verbs for action in read_description(words).actions] == [ACTIONS[name].verbs]
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_sitting_is_asked_for_by_words() -> None:
 
 def test_words_without_meaning_warn_with_the_nearest_known_and_walk(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
-        assert perform("hans on the hibs") == perform("walks")
+        assert read_description("hans on the hibs") == read_description("walks")
     assert "'hans on the hibs' is not understood" in caplog.text and "hands on the hips" in caplog.text
 
 

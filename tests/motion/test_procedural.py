@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from perpetua.geometry.mesh import TriMesh
-from perpetua.motion.actions import perform
-from perpetua.motion.clearing import clear_arms
+from perpetua.motion.action_timeline import draw_timeline
+from perpetua.motion.actions import read_description
+from perpetua.motion.arm_avoidance import clear_arms
 from perpetua.motion.config import MotionConfig
 from perpetua.motion.kinematics import contact_positions, joint_index, joint_positions
-from perpetua.motion.performance import draw_score
 from perpetua.motion.procedural import ProceduralMotion
 from perpetua.scene.actor import BodyMotion, Dwell, Route
 from perpetua.scene.room import Room, SceneObject
@@ -160,9 +160,9 @@ def test_arms_are_drawn_in_beside_a_wall_and_left_alone_in_the_open() -> None:
 def test_actions_come_and_go_and_those_for_standing_wait() -> None:
     time_s = np.arange(0.0, 20.0, 0.02)
     nobody, still = np.zeros(len(time_s)), np.clip(time_s - 10.0, 0.0, 1.0)
-    wave = draw_score(perform("waves"), nobody, nobody, time_s, np.random.default_rng(1)).acts[0].share
+    wave = draw_timeline(read_description("waves"), nobody, nobody, time_s, np.random.default_rng(1)).actions[0].weight
     assert wave.max() > 0.9 and wave.min() == 0.0 and 0.2 < (wave > 0.5).mean() < 0.8
-    other = draw_score(perform("waves"), nobody, nobody, time_s, np.random.default_rng(2)).acts[0].share
+    other = draw_timeline(read_description("waves"), nobody, nobody, time_s, np.random.default_rng(2)).actions[0].weight
     assert not np.array_equal(wave, other)
-    bow = draw_score(perform("bows"), still, nobody, time_s, np.random.default_rng(1))
+    bow = draw_timeline(read_description("bows"), still, nobody, time_s, np.random.default_rng(1))
     assert np.all(bow.lean_rad[time_s < 10.0] == 0.0) and bow.lean_rad.max() > 0.6

@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 from perpetua.errors import ConfigError
-from perpetua.motion.actions import perform, stated_paces, wants_seat
+from perpetua.motion.actions import read_description, stated_paces, wants_seat
 from perpetua.motion.config import MotionConfig
 from perpetua.routes.casting import action_descriptions, cast_actors
 from perpetua.routes.config import PaceShares
@@ -27,7 +27,7 @@ def test_roles_are_drawn_without_repeats_and_the_same_for_the_same_seed() -> Non
 
 def test_every_description_of_the_list_is_understood(caplog: pytest.LogCaptureFixture) -> None:
     for description in action_descriptions(MotionConfig()):
-        perform(description)
+        read_description(description)
     assert not caplog.records
 
 
@@ -47,19 +47,19 @@ def test_words_that_state_a_pace_are_kept_and_given_descriptions_are_all_used() 
 
 
 def test_paces_come_in_their_shares() -> None:
-    shares = PaceShares(stand=0.1, stroll=0.2, walk=0.3, brisk=0.2, jog=0.2)
-    roles = [role for room in range(60) for role in cast_actors(4, MotionConfig(), shares, 4, StageSeed(5, room, "r"))]
+    weights = PaceShares(stand=0.1, stroll=0.2, walk=0.3, brisk=0.2, jog=0.2)
+    roles = [role for room in range(60) for role in cast_actors(4, MotionConfig(), weights, 4, StageSeed(5, room, "r"))]
     assert all(stated_paces(role.description) in (frozenset(), frozenset(role.paces)) for role in roles)
     counts = Counter(role.paces[0] for role in roles if len(role.paces) == 1)
     assert sum(counts.values()) > 0.8 * len(roles)
-    for pace, share in shares.model_dump().items():
-        assert counts[pace] / len(roles) == pytest.approx(share, abs=0.1), pace
+    for pace, weight in weights.model_dump().items():
+        assert counts[pace] / len(roles) == pytest.approx(weight, abs=0.1), pace
 
 
 def test_a_pace_that_is_switched_off_is_drawn_for_nobody() -> None:
-    shares = PaceShares(stand=0.0, stroll=0.0, walk=0.0, brisk=0.0, jog=1.0)
+    weights = PaceShares(stand=0.0, stroll=0.0, walk=0.0, brisk=0.0, jog=1.0)
     silent = MotionConfig(descriptions=("waves the right hand", "looks around"))
-    assert all(role.paces == ("jog",) for role in cast_actors(2, silent, shares, 0, SEED))
+    assert all(role.paces == ("jog",) for role in cast_actors(2, silent, weights, 0, SEED))
 
 
 def test_nobody_sits_where_there_is_no_seat(caplog: pytest.LogCaptureFixture) -> None:

@@ -180,12 +180,12 @@ def target_weights(traits: Traits) -> dict[str, float]:
     total = sum(faces.values())
     weights = {f"macrodetails/{face}-{sex}-{age}": faces[face] / total * ages[age] for face in faces for age in ages}
     for age, muscle, mass in itertools.product(ages, muscles, masses):
-        share = ages[age] * muscles[muscle] * masses[mass]
-        weights[f"macrodetails/universal-{sex}-{age}-{muscle}-{mass}"] = share
+        fraction = ages[age] * muscles[muscle] * masses[mass]
+        weights[f"macrodetails/universal-{sex}-{age}-{muscle}-{mass}"] = fraction
         for height, part in heights.items():
-            weights[f"macrodetails/height/{sex}-{age}-{muscle}-{mass}-{height}"] = share * part
+            weights[f"macrodetails/height/{sex}-{age}-{muscle}-{mass}-{height}"] = fraction * part
         for shape, part in shapes.items():
-            weights[f"macrodetails/proportions/{sex}-{age}-{muscle}-{mass}-{shape}"] = share * part
+            weights[f"macrodetails/proportions/{sex}-{age}-{muscle}-{mass}-{shape}"] = fraction * part
     return {name: weight for name, weight in weights.items() if weight > 0.0}
 
 

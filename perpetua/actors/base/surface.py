@@ -107,9 +107,9 @@ def compact(surface: Surface) -> tuple[Surface, Int32[np.ndarray, " Q"]]:
     return kept, used.astype(np.int32)
 
 
-def _blend(values: np.ndarray, edges: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _blend(values: np.ndarray, edges: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     first, second = values[edges[:, 0]], values[edges[:, 1]]
-    return np.asarray(first + share[:, None] * (second - first))
+    return np.asarray(first + fraction[:, None] * (second - first))
 
 
 def split(surface: Surface, field: Float64[np.ndarray, " P"]) -> tuple[Surface, Float64[np.ndarray, " Q"]]:
@@ -131,11 +131,11 @@ def split(surface: Surface, field: Float64[np.ndarray, " P"]) -> tuple[Surface, 
     new = np.full(changing.shape, -1, dtype=np.int64)
     new[changing] = len(field) + place.ravel()
     pieces = [whole] + [_cut_triangles(cut, new, field, turn) for turn in range(3)]
-    share = field[edges[:, 0]] / (field[edges[:, 0]] - field[edges[:, 1]])
+    fraction = field[edges[:, 0]] / (field[edges[:, 0]] - field[edges[:, 1]])
     grown = Surface(
-        np.concatenate([surface.template_m, _blend(surface.template_m, edges, share)]),
-        np.concatenate([surface.vertices_m, _blend(surface.vertices_m, edges, share)]),
-        np.concatenate([surface.weights, _blend(surface.weights, edges, share)]),
+        np.concatenate([surface.template_m, _blend(surface.template_m, edges, fraction)]),
+        np.concatenate([surface.vertices_m, _blend(surface.vertices_m, edges, fraction)]),
+        np.concatenate([surface.weights, _blend(surface.weights, edges, fraction)]),
         np.concatenate(pieces).astype(np.int32),
     )
     return grown, np.concatenate([field, np.zeros(len(edges))])

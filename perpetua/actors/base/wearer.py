@@ -23,16 +23,16 @@ class Wearer:
     vertices_m: Float64[np.ndarray, "P 3"]
 
 
-def share_of(weights: Float64[np.ndarray, "P J"], joints: tuple[str, ...]) -> Float64[np.ndarray, " P"]:
+def weight_of(weights: Float64[np.ndarray, "P J"], joints: tuple[str, ...]) -> Float64[np.ndarray, " P"]:
     """Skinning weight of the named joints of both sides together."""
     columns = [joint_index(f"{side}_{joint}") for side in ("left", "right") for joint in joints]
     return np.asarray(weights[:, columns].sum(axis=1))
 
 
-def arm_share(weights: Float64[np.ndarray, "P J"]) -> Float64[np.ndarray, " P"]:
+def arm_weight(weights: Float64[np.ndarray, "P J"]) -> Float64[np.ndarray, " P"]:
     """How much a vertex belongs to an arm, fingers included, 0 to 1."""
     fingers = [joint_index(joint) for joint in FINGER_JOINTS]
-    return np.asarray(share_of(weights, _ARM) + weights[:, fingers].sum(axis=1))
+    return np.asarray(weight_of(weights, _ARM) + weights[:, fingers].sum(axis=1))
 
 
 @lru_cache(maxsize=1)

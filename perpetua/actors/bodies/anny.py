@@ -29,7 +29,7 @@ _BODY_VERTICES = 13380
 _MOUTH_UV = (0.74, 0.14)
 _LASHES = tuple(f"helper-{side}-eyelashes-{row}" for side in ("l", "r") for row in (1, 2))
 # How much of the sheets' length is left, for men and women.
-_LASH_SHARE = {False: 0.22, True: 0.42}
+_LASH_FRACTION = {False: 0.22, True: 0.42}
 _LASH_COLOUR = (0.012, 0.009, 0.008)
 
 
@@ -89,8 +89,8 @@ def shaped(person: Person) -> Float64[np.ndarray, "P 3"]:
 
     low, high = at(0.0), at(1.0)
     statures = [float(np.ptp(vertices[:_BODY_VERTICES, 2])) for vertices in (low, high)]
-    share = (person.stature_m - statures[0]) / (statures[1] - statures[0])
-    return low + share * (high - low)
+    fraction = (person.stature_m - statures[0]) / (statures[1] - statures[0])
+    return low + fraction * (high - low)
 
 
 def _flesh(
@@ -126,20 +126,20 @@ def _flesh(
     weights[stiff] = 0.0
     weights[stiff, joint_index("head")] = 1.0
     return Piece(
-        _with_short_lashes(wearer.vertices_m, np.unique(lashes), _LASH_SHARE[person.traits.female]),
+        _with_short_lashes(wearer.vertices_m, np.unique(lashes), _LASH_FRACTION[person.traits.female]),
         weights,
         tuple(parts),
     )
 
 
 def _with_short_lashes(
-    vertices_m: Float64[np.ndarray, "P 3"], lashes: Int32[np.ndarray, " L"], share: float
+    vertices_m: Float64[np.ndarray, "P 3"], lashes: Int32[np.ndarray, " L"], fraction: float
 ) -> Float64[np.ndarray, "P 3"]:
     """The body with eyelashes of a natural length: MakeHuman's are sheets for pictures of lashes."""
     skin_m = vertices_m[:_BODY_VERTICES]
     _, root = cKDTree(skin_m).query(vertices_m[lashes])
     shortened = vertices_m.copy()
-    shortened[lashes] = skin_m[root] + share * (vertices_m[lashes] - skin_m[root])
+    shortened[lashes] = skin_m[root] + fraction * (vertices_m[lashes] - skin_m[root])
     return shortened
 
 

@@ -12,8 +12,8 @@ from perpetua.routes.casting import action_descriptions
 from perpetua.scene.actor import BODY_JOINTS, ActorMesh, BodyMotion, Skeleton
 from perpetua.seeding import StageSeed
 
-# What is sat on: so far behind the hip joints, along this share of the thighs, and so far to either side.
-_BUTTOCK_M, _THIGH_SHARE, _HALF_WIDTH_M = 0.08, 0.7, 0.22
+# What is sat on: so far behind the hip joints, along this fraction of the thighs, and so far to either side.
+_BUTTOCK_M, _THIGH_FRACTION, _HALF_WIDTH_M = 0.08, 0.7, 0.22
 
 
 def check_people(config: ActorsConfig) -> None:
@@ -54,7 +54,7 @@ def _seat_m(body: Body) -> float:
     posed = body.pose(BodyMotion(0, 1.0, rotation, joint_m[:1], np.zeros((1, 4), bool)))[0].astype(np.float64)
     from_hip_m = posed - joint_m[hip]
     thigh_m = float(np.linalg.norm(joint_m[knee] - joint_m[hip]))
-    under = (from_hip_m[:, 0] > -_BUTTOCK_M) & (from_hip_m[:, 0] < _THIGH_SHARE * thigh_m)
+    under = (from_hip_m[:, 0] > -_BUTTOCK_M) & (from_hip_m[:, 0] < _THIGH_FRACTION * thigh_m)
     near = np.abs(posed[:, 1]) < _HALF_WIDTH_M
     # Shins and feet, which hang at the knees, are not sat on.
     return float(-np.percentile(from_hip_m[under & near, 2], 0.5))

@@ -13,7 +13,7 @@ from perpetua.actors.base.rig import BONE_COUNT, base_weights, joint_index
 from perpetua.actors.base.surface import catmull_clark, positive, triangles, vertex_normals
 from perpetua.actors.base.wearer import Wearer
 from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb
-from perpetua.actors.clothing.unwrap import around
+from perpetua.actors.clothing.unwrap import unrolled
 from perpetua.scene.actor import ActorPart
 from perpetua.scene.room import Material
 
@@ -329,10 +329,10 @@ def _ponytail(cap: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A tail of hair that falls from the back of the head."""
     tie = cap.vertices_m[np.argmin(np.linalg.norm(cap.template_m - _TIE_M, axis=1))]
     rows, columns = 12, 14
-    share = np.linspace(0.0, 1.0, rows)
-    back_m = np.interp(share, [0.0, 0.12, 0.3, 1.0], [0.004, -0.030, -0.042, -0.022])
-    down_m = np.interp(share, [0.0, 0.12, 0.3, 1.0], [0.008, 0.004, -0.045, -0.24])
-    radius_m = np.interp(share, [0.0, 0.10, 0.35, 0.75, 1.0], [0.012, 0.012, 0.026, 0.022, 0.004])
+    fraction = np.linspace(0.0, 1.0, rows)
+    back_m = np.interp(fraction, [0.0, 0.12, 0.3, 1.0], [0.004, -0.030, -0.042, -0.022])
+    down_m = np.interp(fraction, [0.0, 0.12, 0.3, 1.0], [0.008, 0.004, -0.045, -0.24])
+    radius_m = np.interp(fraction, [0.0, 0.10, 0.35, 0.75, 1.0], [0.012, 0.012, 0.026, 0.022, 0.004])
     turn = np.linspace(0.0, 2.0 * np.pi, columns)
     ripple = 1.0 + 0.10 * np.sin(5.0 * turn)[None, :] + 0.05 * np.sin(9.0 * turn + 1.0)[None, :]
     round_m = radius_m[:, None] * ripple
@@ -341,7 +341,7 @@ def _ponytail(cap: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     grid = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (part.ravel() for part in (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]))
     faces = np.concatenate([np.stack([a, c, b], axis=1), np.stack([a, d, c], axis=1)]).astype(np.int32)
-    flat = np.stack(np.broadcast_arrays(turn[None, :] / np.pi, share[:, None]), axis=2).reshape(-1, 2)
+    flat = np.stack(np.broadcast_arrays(turn[None, :] / np.pi, fraction[:, None]), axis=2).reshape(-1, 2)
     return vertices.reshape(-1, 3), faces, flat[faces].astype(np.float32)
 
 
@@ -359,7 +359,7 @@ def make_hair(wearer: Wearer, style: HairStyle, colour: tuple[float, float, floa
     height_m = 0.0015 + rise * (style.cap_m + style.bumps_m * _bumpy(scalp.template_m, rng))
     cap_m = scalp.vertices_m + height_m[:, None] * normal
     cap = Surface(scalp.template_m, cap_m, scalp.weights, scalp.faces)
-    cap_uv: Float32[np.ndarray, "F 3 2"] = around(
+    cap_uv: Float32[np.ndarray, "F 3 2"] = unrolled(
         scalp.template_m, scalp.faces, _CROWN_M, _CROWN_M - np.array([0.0, 0.0, 0.2]), np.array([-1.0, 0.0, 0.0]), 0.16
     ) / np.float32(0.2)
     vertices, faces, uvs = [cap_m], [scalp.faces], [cap_uv]

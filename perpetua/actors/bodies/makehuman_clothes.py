@@ -44,7 +44,7 @@ _FOOT_M = 0.06
 # How far along a shoe its heel and ball reach, and over which height the levelling of soles fades.
 _NEAR_M, _STIFF_M, _FADE_M = 0.025, 0.04, 0.10
 _LEVEL_PASSES = 4
-_HEEL_SHARE, _TOE_SHARE = 0.04, 0.84
+_HEEL_FRACTION, _TOE_FRACTION = 0.04, 0.84
 # Hair under a hat ends so far above the hat's lowest edge.
 _BRIM_M = 0.02
 # How far shoes and socks go on under the hems of trousers.
@@ -88,7 +88,7 @@ def fitted(binding: Binding, vertices_m: Float64[np.ndarray, "B 3"]) -> Float64[
     """
     # MakeHuman's axes: X to the body's left, Y up, Z forward.
     base_dm = vertices_m[:, [1, 2, 0]] / _DECIMETRE_M
-    place_dm = np.einsum("pc,pcd->pd", binding.shares, base_dm[binding.base_vertices])
+    place_dm = np.einsum("pc,pcd->pd", binding.corner_weights, base_dm[binding.base_vertices])
     for axis, scale in enumerate(binding.scales):
         unit = 1.0
         if scale is not None:
@@ -98,10 +98,10 @@ def fitted(binding: Binding, vertices_m: Float64[np.ndarray, "B 3"]) -> Float64[
 
 
 def bound_weights(binding: Binding) -> Float64[np.ndarray, "P J"]:
-    """Skinning weights: those of the base vertices, in the shares of the binding."""
-    shares = np.maximum(binding.shares, 0.0)
-    shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-12)
-    weights = np.einsum("pc,pcj->pj", shares, base_weights()[binding.base_vertices])
+    """Skinning weights: those of the base vertices, in the proportions of the binding."""
+    corner_weights = np.maximum(binding.corner_weights, 0.0)
+    corner_weights /= np.maximum(corner_weights.sum(axis=1, keepdims=True), 1e-12)
+    weights = np.einsum("pc,pcj->pj", corner_weights, base_weights()[binding.base_vertices])
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
@@ -137,10 +137,10 @@ def _sewn(garment: Garment, wearer: Wearer, look: Look | None, image: np.ndarray
     """A garment on the body, without what others hide and what its texture makes transparent."""
     binding = garment.binding
     mesh = read_mesh(binding.mesh_path)
-    if mesh.vertex_count != len(binding.shares):
+    if mesh.vertex_count != len(binding.corner_weights):
         raise AssetError(
             f"'{binding.path}' must bind as many vertices as '{binding.mesh_path.name}' has, {mesh.vertex_count}, not "
-            f"{len(binding.shares)}: mend the file or take it out of the folder"
+            f"{len(binding.corner_weights)}: mend the file or take it out of the folder"
         )
     vertices_m, weights = fitted(binding, wearer.vertices_m), bound_weights(binding)
     seen = ~np.all(hidden[binding.base_vertices], axis=1)[mesh.faces].all(axis=1)
@@ -170,7 +170,7 @@ def _heel_and_toe_x_m(side_m: Float64[np.ndarray, "P 3"]) -> tuple[float, float]
     """Where along one shoe its heel and its ball stand."""
     low = side_m[side_m[:, 2] < float(side_m[:, 2].min()) + _FOOT_M]
     start, length = float(low[:, 0].min()), float(np.ptp(low[:, 0]))
-    return start + _HEEL_SHARE * length, start + _TOE_SHARE * length
+    return start + _HEEL_FRACTION * length, start + _TOE_FRACTION * length
 
 
 def _levelled(shoes: Piece) -> Piece:
@@ -311,8 +311,8 @@ def _brows(
 
 
 def _ancestry(person: Person) -> str:
-    shares = {name: getattr(person.traits, name) for name in ("african", "asian", "european")}
-    return max(shares, key=lambda name: shares[name])
+    fractions = {name: getattr(person.traits, name) for name in ("african", "asian", "european")}
+    return max(fractions, key=lambda name: fractions[name])
 
 
 def _words(chosen: _Chosen, person: Person) -> str:

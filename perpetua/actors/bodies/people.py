@@ -103,11 +103,11 @@ def draw_person(actor: int, config: ActorsConfig, seed: StageSeed) -> Person:
     muscle = float(rng.uniform(0.32, 0.72))
     mean_m, deviation_m = _STATURE_M[female]
     stature_m = mean_m + deviation_m * float(np.clip(rng.normal(), -1.8, 1.8))
-    shares = {"african": 0.08, "asian": 0.08, "european": 0.08, ancestry: 0.84}
+    fractions = {"african": 0.08, "asian": 0.08, "european": 0.08, ancestry: 0.84}
     old = min(max((age_years - 25.0) / 55.0, 0.0), 1.0)
     traits = Traits(
         female, 2.0 / 3.0 + old / 3.0, muscle, weight, 0.5, float(rng.uniform(0.0, 0.6)),
-        shares["african"], shares["asian"], shares["european"],
+        fractions["african"], fractions["asian"], fractions["european"],
     )  # fmt: skip
     low, high = _TONE_RANGES[ancestry]
     depth = float(rng.uniform(low, high)) * (len(_TONES) - 1)

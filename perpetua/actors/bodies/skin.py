@@ -15,7 +15,7 @@ EYE_PX = 128
 # Rows from and to, and columns from, which the head takes up in the skin image.
 _HEAD_PX = (170, 890, 640)
 _EYE_M = np.array([0.125, 0.031, 0.729])
-_IRIS_SHARE = 0.50
+_IRIS_FRACTION = 0.50
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ def texel_places_m() -> Float32[np.ndarray, "S S 3"]:
         chosen = (size_px * 1.5 <= steps) & (size_px * 1.5 > (steps // 2 if steps > 4 else -1))
         edge = (np.arange(steps) + 0.5) / steps
         s, t = (axis.ravel()[None, :, None] for axis in np.meshgrid(edge, edge))
-        shares = ((1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t)
-        pixel = sum(share * corner_px[chosen][:, None, corner] for corner, share in enumerate(shares))
-        place = sum(share * corner_m[chosen][:, None, corner] for corner, share in enumerate(shares))
+        fractions = ((1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t)
+        pixel = sum(fraction * corner_px[chosen][:, None, corner] for corner, fraction in enumerate(fractions))
+        place = sum(fraction * corner_m[chosen][:, None, corner] for corner, fraction in enumerate(fractions))
         column, row = np.moveaxis(np.clip(np.floor(pixel), 0, SKIN_PX - 1).astype(np.int64), -1, 0)
         places[row.ravel(), column.ravel()] = place.reshape(-1, 3)
         known[row.ravel(), column.ravel()] = True
@@ -64,9 +64,10 @@ def _blob(places: np.ndarray, centre: tuple[float, float, float], radius: tuple[
 def _brows(places: np.ndarray, width_m: float) -> np.ndarray:
     """Eyebrows: an arch above each eye that thins outward."""
     side = np.abs(places[..., 1])
-    share = np.clip((side - 0.011) / 0.042, 0.0, 1.0)
-    arch_z = _EYE_M[2] + 0.0195 + 0.007 * np.sin(np.pi * np.clip(share * 0.85, 0.0, 1.0)) - 0.004 * share * share
-    half = width_m * (1.0 - 0.65 * share)
+    fraction = np.clip((side - 0.011) / 0.042, 0.0, 1.0)
+    arch = 0.007 * np.sin(np.pi * np.clip(fraction * 0.85, 0.0, 1.0))
+    arch_z = _EYE_M[2] + 0.0195 + arch - 0.004 * fraction * fraction
+    half = width_m * (1.0 - 0.65 * fraction)
     across = np.clip(1.5 - np.abs(places[..., 2] - arch_z) / half, 0.0, 1.0)
     ends = np.clip((side - 0.009) / 0.004, 0.0, 1.0) * np.clip((0.054 - side) / 0.006, 0.0, 1.0)
     return np.asarray(across * ends * (places[..., 0] > 0.10))
@@ -130,10 +131,10 @@ def paint_eye(look: Complexion, rng: np.random.Generator) -> UInt8[np.ndarray, "
     for count in (11, 23, 37):
         fibres += np.sin(count * angle + rng.uniform(0.0, 2.0 * np.pi)) / 3.0
     iris = np.array(look.iris) * (1.0 + 0.35 * fibres)[..., None]
-    ring = np.clip((radius - 0.8 * _IRIS_SHARE) / (0.2 * _IRIS_SHARE), 0.0, 1.0)[..., None]
+    ring = np.clip((radius - 0.8 * _IRIS_FRACTION) / (0.2 * _IRIS_FRACTION), 0.0, 1.0)[..., None]
     iris = iris * (1.0 - 0.75 * ring)
-    colour = np.where((radius < _IRIS_SHARE)[..., None], iris, white)
-    return to_srgb(np.where((radius < 0.42 * _IRIS_SHARE)[..., None], 0.004, colour))
+    colour = np.where((radius < _IRIS_FRACTION)[..., None], iris, white)
+    return to_srgb(np.where((radius < 0.42 * _IRIS_FRACTION)[..., None], 0.004, colour))
 
 
 def eye_uv(eye_m: Float64[np.ndarray, "E 3"], corners_m: Float64[np.ndarray, "F 3 3"]) -> Float32[np.ndarray, "F 3 2"]:

@@ -38,11 +38,11 @@ _TOP_DYES = ("teal", "red", "navy", "mustard", "green", "sky", "burgundy", "oran
 _LEG_DYES = ("navy", "charcoal", "beige", "olive", "grey", "brown")
 _SHOE_DYES = ("white", "charcoal", "brown", "grey")
 _TOP_FABRICS = ("stripes", "checks", "heather", "knit", "dots", "denim")
-# Sleeves and legs as shares of arm and leg, and what they are called.
+# Sleeves and legs as fractions of arm and leg, and what they are called.
 _TOPS = ((0.36, "T-shirt"), (0.93, "long-sleeved top"))
 _LEGS = ((1.2, "trousers"), (0.52, "shorts"))
 _SKIN_TILE_M, _BEDLAM_TILE_M, _HAIR_TILE_M = 0.35, 0.8, 0.25
-_HEEL_SHARE, _TOE_SHARE = 0.05, 0.80
+_HEEL_FRACTION, _TOE_FRACTION = 0.05, 0.80
 _FOOT_M = 0.05
 
 
@@ -56,14 +56,14 @@ class SmplxBody:
     _model: SmplxModel
     _vertices_m: Float64[np.ndarray, "10475 3"]
     _ends: Int32[np.ndarray, "P 2"]
-    _share: Float32[np.ndarray, " P"]
+    _fraction: Float32[np.ndarray, " P"]
 
     def pose(self, motion: BodyMotion) -> Float32[np.ndarray, "T P 3"]:
         """World positions in metres of all vertices at each frame of the motion."""
         local = local_rotations(motion, relaxed_fingers())
         posed = posed_m(self._model, self._vertices_m, local, motion.pelvis_m)
         first, second = posed[:, self._ends[:, 0]], posed[:, self._ends[:, 1]]
-        return np.asarray(first + self._share[:, None] * (second - first))
+        return np.asarray(first + self._fraction[:, None] * (second - first))
 
 
 @dataclass(frozen=True)
@@ -100,10 +100,10 @@ class SmplxBodies:
         clothes = _draw_clothes(actor, seed, rng)
         surface, vertices_m = cut_parts(model, bare_m, rest_joints_m(model, bare_m), clothes.cut)
         looks = _Looks(model, person.complexion, female, clothes, textures, rng)
-        ends, share, parts = _parts(model, surface, bare_m, looks)
+        ends, fraction, parts = _parts(model, surface, bare_m, looks)
         stature_cm = round(100.0 * float(np.ptp(bare_m[:, 2])))
         words = f"a {'woman' if female else 'man'}, {stature_cm} cm tall, wearing {clothes.words}"
-        return SmplxBody(words, _skeleton(model, vertices_m), parts, model, vertices_m, ends, share)
+        return SmplxBody(words, _skeleton(model, vertices_m), parts, model, vertices_m, ends, fraction)
 
 
 def models_folder(config: SmplxConfig) -> Path:
@@ -215,7 +215,7 @@ def _parts(
         else:
             uv = wrapped_uv(corner_m[chosen], joint_m, tile_m)
         parts.append(ActorPart(label, faces[chosen], uv, material))
-    return surface.ends[used], surface.share[used], tuple(parts)
+    return surface.ends[used], surface.fraction[used], tuple(parts)
 
 
 def _skeleton(model: SmplxModel, vertices_m: Float64[np.ndarray, "10475 3"]) -> Skeleton:
@@ -229,7 +229,7 @@ def _skeleton(model: SmplxModel, vertices_m: Float64[np.ndarray, "10475 3"]) -> 
         foot = vertices_m[model.weights[:, columns].sum(axis=1) > 0.5]
         low = foot[foot[:, 2] < floor_m + _FOOT_M]
         start, length = float(low[:, 0].min()), float(np.ptp(low[:, 0]))
-        for share in (_HEEL_SHARE, _TOE_SHARE):
-            near = low[np.abs(low[:, 0] - start - share * length) < 0.1 * length]
-            contacts.append(np.array([start + share * length, near[:, 1].mean(), floor_m]))
+        for fraction in (_HEEL_FRACTION, _TOE_FRACTION):
+            near = low[np.abs(low[:, 0] - start - fraction * length) < 0.1 * length]
+            contacts.append(np.array([start + fraction * length, near[:, 1].mean(), floor_m]))
     return Skeleton(joint_m - origin, np.stack(contacts) - origin)

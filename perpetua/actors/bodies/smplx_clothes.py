@@ -18,14 +18,14 @@ _BODY, _LEFT_EYE, _RIGHT_EYE, _SHOES, _TROUSERS, _TOP, _HAIR = range(len(LABELS)
 _THICKNESS_M = (0.0, 0.0, 0.0, 0.007, 0.006, 0.008, 0.012)
 _SMOOTHING = 2
 _BISECTIONS = 14
-# Where the hair begins: share of the way from the head joint to the crown, by how far in front of the joint.
+# Where the hair begins: fraction of the way from the head joint to the crown, by how far in front of the joint.
 _HAIRLINE_X_M = (-0.08, -0.02, 0.03, 0.07, 0.11)
-_HAIRLINE_SHARE = (0.0, 0.15, 0.55, 0.78, 0.84)
+_HAIRLINE_FRACTION = (0.0, 0.15, 0.55, 0.78, 0.84)
 
 
 @dataclass(frozen=True)
 class Cut:
-    """What is worn: ``sleeve`` and ``leg`` as shares of arm and leg, heights and widths in metres."""
+    """What is worn: ``sleeve`` and ``leg`` as fractions of arm and leg, heights and widths in metres."""
 
     sleeve: float
     leg: float
@@ -39,13 +39,13 @@ class Cut:
 class CutSurface:
     """A body's surface cut into parts. Vertices are places on edges of the body's own mesh.
 
-    Vertex p lies at ``share[p]`` of the way from body vertex ``ends[p, 0]`` to ``ends[p, 1]``. ``labels`` are those of
-    faces, indices into ``LABELS``; ``source`` is the body's face that each came from and ``corners`` the place of its
-    corners in it.
+    Vertex p lies at ``fraction[p]`` of the way from body vertex ``ends[p, 0]`` to ``ends[p, 1]``. ``labels`` are
+    those of faces, indices into ``LABELS``; ``source`` is the body's face that each came from and ``corners`` the
+    places of its corners in it.
     """
 
     ends: Int32[np.ndarray, "P 2"]
-    share: Float32[np.ndarray, " P"]
+    fraction: Float32[np.ndarray, " P"]
     faces: Int32[np.ndarray, "F 3"]
     labels: Int64[np.ndarray, " F"]
     source: Int64[np.ndarray, " F"]
@@ -84,11 +84,11 @@ class _Outlines:
 
     def _scalp(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         head = self._joint("head")
-        line = np.interp(x - head[0], _HAIRLINE_X_M, _HAIRLINE_SHARE)
+        line = np.interp(x - head[0], _HAIRLINE_X_M, _HAIRLINE_FRACTION)
         return np.asarray(z > head[2] + line * (self.crown_z_m - head[2]))
 
 
-def _head_share(model: SmplxModel) -> Float64[np.ndarray, "10475"]:
+def _head_weight(model: SmplxModel) -> Float64[np.ndarray, "10475"]:
     """Weight of head and jaw; the neck counts by half of what is shared with it."""
     columns = [BODY_JOINTS.index("head"), 22, LEFT_EYE, RIGHT_EYE]
     return model.weights[:, columns].sum(axis=1).astype(np.float64)
@@ -111,8 +111,8 @@ def _edge_places(
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         place = place_m[ends[:, 0]] + middle[:, None] * (place_m[ends[:, 1]] - place_m[ends[:, 0]])
-        share = head[ends[:, 0]] + middle * (head[ends[:, 1]] - head[ends[:, 0]])
-        same = outlines.label(place, share) == first
+        fraction = head[ends[:, 0]] + middle * (head[ends[:, 1]] - head[ends[:, 0]])
+        same = outlines.label(place, fraction) == first
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     return np.asarray(np.clip(0.5 * (low + high), 0.02, 0.98))
 
@@ -131,7 +131,7 @@ def cut_parts(
     Returns:
         The surface, and the body's vertices lifted by what lies on them.
     """
-    outlines, head, eye = _Outlines(cut, joint_m, float(vertices_m[:, 2].max())), _head_share(model), _eyes(model)
+    outlines, head, eye = _Outlines(cut, joint_m, float(vertices_m[:, 2].max())), _head_weight(model), _eyes(model)
     label = outlines.label(vertices_m, head)
     corner_label = label[model.faces]
     mixed = (corner_label.min(axis=1) != corner_label.max(axis=1)) & (eye == 0)
@@ -169,11 +169,13 @@ def _with_cut_faces(
     a, b, c = np.take_along_axis(model.faces[two], order, axis=1).astype(np.int64).T
     edges = np.concatenate([np.stack([a, b], axis=1), np.stack([a, c], axis=1)])
     ends, place = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-    share = _edge_places(outlines, vertices_m, head, label, ends)
+    fraction = _edge_places(outlines, vertices_m, head, label, ends)
     new = len(vertices_m) + place.reshape(2, -1)
     # Barycentric places of the five points of each cut face.
     corner = np.eye(3)[order]
-    from_a = np.where(edges[:, 0] < edges[:, 1], share[place.ravel()], 1.0 - share[place.ravel()]).reshape(2, -1, 1)
+    from_a = np.where(edges[:, 0] < edges[:, 1], fraction[place.ravel()], 1.0 - fraction[place.ravel()]).reshape(
+        2, -1, 1
+    )
     on_ab, on_ac = (corner[:, 0] + from_a[i] * (corner[:, i + 1] - corner[:, 0]) for i in range(2))
     tip = np.stack([a, new[0], new[1]], axis=1)
     rest = (np.stack([new[0], b, c], axis=1), np.stack([new[0], c, new[1]], axis=1))
@@ -183,7 +185,7 @@ def _with_cut_faces(
     kept = np.flatnonzero(whole)
     return CutSurface(
         np.concatenate([own, ends]).astype(np.int32),
-        np.concatenate([np.zeros(len(vertices_m)), share]).astype(np.float32),
+        np.concatenate([np.zeros(len(vertices_m)), fraction]).astype(np.float32),
         np.concatenate([model.faces[whole], tip, *rest]).astype(np.int32),
         np.concatenate([whole_label, label[a], label[b], label[b]]),
         np.concatenate([kept, two, two, two]),

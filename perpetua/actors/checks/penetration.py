@@ -38,16 +38,16 @@ class Obstacles:
 
 def make_obstacles(room: Room, low_m: float) -> Obstacles:
     """All triangles of a room that rise above the height ``low_m``; what is lower is stepped over."""
-    triangles_m = [thing.mesh.vertices_m[thing.mesh.faces] for thing in room.objects]
+    triangles_m = [obj.mesh.vertices_m[obj.mesh.faces] for obj in room.objects]
     high = [corners_m[:, :, 2].max(axis=1) > low_m for corners_m in triangles_m]
     owners = [np.full(int(rises.sum()), index, np.int64) for index, rises in enumerate(high)]
     soup = _soup([corners_m[rises] for corners_m, rises in zip(triangles_m, high, strict=True)])
-    return Obstacles(Caster(soup), tuple(thing.name for thing in room.objects), np.concatenate(owners))
+    return Obstacles(Caster(soup), tuple(obj.name for obj in room.objects), np.concatenate(owners))
 
 
 def make_floor(room: Room) -> Caster:
     """What people can stand on."""
-    return Caster(_soup([thing.mesh.vertices_m[thing.mesh.faces] for thing in room.objects if thing.walkable]))
+    return Caster(_soup([obj.mesh.vertices_m[obj.mesh.faces] for obj in room.objects if obj.walkable]))
 
 
 def _soup(triangles_m: list[np.ndarray]) -> TriMesh:
@@ -67,7 +67,7 @@ class Probe:
 
     vertices: Int64[np.ndarray, " P"]
     bone_of: Int64[np.ndarray, " P"]
-    share_of: Float64[np.ndarray, " P"]
+    fraction_of: Float64[np.ndarray, " P"]
 
     def skin_m(self, actor: ActorMesh, frames: Int64[np.ndarray, " K"]) -> Float64[np.ndarray, "K P 3"]:
         """Places of the vertices."""
@@ -78,7 +78,7 @@ class Probe:
     ) -> Float64[np.ndarray, "K P 3"]:
         """Places on the bones."""
         start_m, end_m = _bone_ends_m(joint_m, frames)
-        return start_m[:, self.bone_of] + self.share_of[None, :, None] * (end_m - start_m)[:, self.bone_of]
+        return start_m[:, self.bone_of] + self.fraction_of[None, :, None] * (end_m - start_m)[:, self.bone_of]
 
 
 def make_probe(
@@ -87,8 +87,8 @@ def make_probe(
     """About ``count`` vertices of an actor with the bone that each keeps closest to; ``joint_m`` is for all frames."""
     vertices = sampled_vertices(actor, count)
     few = frames[np.unique(np.linspace(0, len(frames) - 1, 8).astype(np.int64))]
-    bone_of, share_of = _closest_bones(actor.vertices_m[np.ix_(few, vertices)].astype(np.float64), joint_m[few])
-    return Probe(vertices, bone_of, share_of)
+    bone_of, fraction_of = _closest_bones(actor.vertices_m[np.ix_(few, vertices)].astype(np.float64), joint_m[few])
+    return Probe(vertices, bone_of, fraction_of)
 
 
 def scene_depth(
@@ -149,8 +149,8 @@ def _deepest(
     if len(depth_m) == 0:
         return Worst(0.0, 0, "nothing")
     deepest = int(depth_m.argmax())
-    thing = obstacles.object_names[obstacles.object_of_face[face[deepest]]]
-    return Worst(float(depth_m[deepest]), int(frame[deepest]), f"'{thing}'")
+    name = obstacles.object_names[obstacles.object_of_face[face[deepest]]]
+    return Worst(float(depth_m[deepest]), int(frame[deepest]), f"'{name}'")
 
 
 def _closest_bones(
@@ -159,16 +159,16 @@ def _closest_bones(
     """For each vertex the bone that it keeps closest to over some frames, and where along it (0 to 1)."""
     best_m = np.full(vertices_m.shape[1], np.inf)
     bone_of = np.zeros(vertices_m.shape[1], np.int64)
-    share_of = np.zeros(vertices_m.shape[1])
+    fraction_of = np.zeros(vertices_m.shape[1])
     for index, (parent, joint) in enumerate(_BONES):
         start_m, along_m = joint_m[:, None, parent], (joint_m[:, joint] - joint_m[:, parent])[:, None]
-        share = np.sum((vertices_m - start_m) * along_m, axis=2) / np.maximum(np.sum(along_m**2, axis=2), 1e-12)
-        share = np.clip(share, 0.0, 1.0)
+        fraction = np.sum((vertices_m - start_m) * along_m, axis=2) / np.maximum(np.sum(along_m**2, axis=2), 1e-12)
+        fraction = np.clip(fraction, 0.0, 1.0)
         # A hand may hang beside a thigh at one frame: only what is never far belongs together.
-        away_m = np.linalg.norm(vertices_m - start_m - share[..., None] * along_m, axis=2).max(axis=0)
+        away_m = np.linalg.norm(vertices_m - start_m - fraction[..., None] * along_m, axis=2).max(axis=0)
         closer = away_m < best_m
-        best_m[closer], bone_of[closer], share_of[closer] = away_m[closer], index, share.mean(axis=0)[closer]
-    return bone_of, share_of
+        best_m[closer], bone_of[closer], fraction_of[closer] = away_m[closer], index, fraction.mean(axis=0)[closer]
+    return bone_of, fraction_of
 
 
 @dataclass(frozen=True)
@@ -211,8 +211,8 @@ def _crossings(
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
     normal *= np.where(np.sum(normal * offset_m[cut], axis=1, keepdims=True) < 0.0, -1.0, 1.0)
     row, column = np.divmod(cut, inside_m.shape[1])
-    share = hits.distance_m[cut] / np.maximum(length_m[cut], 1e-9)
-    place_m = inside_m.reshape(-1, 3)[cut] + share[:, None] * offset_m[cut]
+    fraction = hits.distance_m[cut] / np.maximum(length_m[cut], 1e-9)
+    place_m = inside_m.reshape(-1, 3)[cut] + fraction[:, None] * offset_m[cut]
     return _Crossings(row, column, hits.face[cut].astype(np.int64), place_m, normal)
 
 

@@ -124,7 +124,7 @@ def validate_actors(
         config: limits, and how many frames and vertices are checked against scene and actors.
 
     Raises:
-        ActorError: a limit is broken; names the actor, the frame, the thing and the value.
+        ActorError: a limit is broken; names the actor, the frame, the object and the value.
     """
     frames = np.unique(np.linspace(0, len(routes[0].heading_rad) - 1, config.frames).astype(np.int64))
     low_m = float(min(route.position_m[:, 2].min() for route in routes)) + config.step_m
@@ -148,7 +148,7 @@ def check_limits(report: ActorReport, config: ValidationConfig) -> None:
         name = f"actor {figures.actor}"
         _check(figures.scene_depth, config.max_scene_depth_m, name, "max_scene_depth_m", "goes", "into")
         _check(figures.path_error, config.max_path_error_m, name, "max_path_error_m", "strays", "from")
-        for worst, share_m, limit_m, key, verb, preposition in (
+        for worst, percentile_m, limit_m, key, verb, preposition in (
             (
                 figures.sole_penetration, figures.sole_penetration_99th_m, config.max_sole_penetration_m,
                 "max_sole_penetration_m", "sinks", "into",
@@ -157,7 +157,7 @@ def check_limits(report: ActorReport, config: ValidationConfig) -> None:
                 figures.floating, figures.floating_99th_m, config.max_floating_m, "max_floating_m", "floats", "above",
             ),
         ):  # fmt: skip
-            if share_m > limit_m:
+            if percentile_m > limit_m:
                 _check(worst, limit_m, name, key, verb, preposition)
         if figures.joint_excess_rad > config.max_joint_excess_rad:
             raise ActorError(

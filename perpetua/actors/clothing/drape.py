@@ -57,9 +57,9 @@ def draped(surface: Surface, ease_m: Float64[np.ndarray, " P"], how: Drape) -> F
     return _pushed_out(cloth + how.fold_m[:, None] * normal, surface.vertices_m, normal, how.gap_m)
 
 
-def _bridged(cloth_m: Float64[np.ndarray, "P 3"], share: Float64[np.ndarray, " P"]) -> Float64[np.ndarray, "P 3"]:
-    """The cloth moved outward in the horizontal, by a share of the way to the convex hull of its own level."""
-    concerned = np.flatnonzero(share > 0.0)
+def _bridged(cloth_m: Float64[np.ndarray, "P 3"], fraction: Float64[np.ndarray, " P"]) -> Float64[np.ndarray, "P 3"]:
+    """The cloth moved outward in the horizontal, by a fraction of the way to the convex hull of its own level."""
+    concerned = np.flatnonzero(fraction > 0.0)
     moved = cloth_m.copy()
     if len(concerned) == 0:
         return moved
@@ -82,7 +82,7 @@ def _bridged(cloth_m: Float64[np.ndarray, "P 3"], share: Float64[np.ndarray, " P
     at = np.clip((places[:, 2] - lowest) / max(highest - lowest, 1e-9) * (len(levels) - 1), 0.0, len(levels) - 1.001)
     below, column = at.astype(np.int64), np.arange(len(concerned))
     push_m = (below + 1 - at) * outward_m[below, column] + (at - below) * outward_m[below + 1, column]
-    moved[concerned, :2] += (share[concerned] * push_m / reach_m)[:, None] * offset
+    moved[concerned, :2] += (fraction[concerned] * push_m / reach_m)[:, None] * offset
     return moved
 
 

@@ -54,8 +54,8 @@ def _weave(rng: np.random.Generator) -> Float64[np.ndarray, "S S"]:
     return np.asarray(1.0 + 0.06 * warp * weft + slub + 0.03 * tileable_noise(rng, SIZE_PX, 40, 3))
 
 
-def _mix(base: np.ndarray, other: np.ndarray, share: np.ndarray) -> Float64[np.ndarray, "S S 3"]:
-    return np.asarray(base * (1.0 - share[..., None]) + other * share[..., None])
+def _mix(base: np.ndarray, other: np.ndarray, fraction: np.ndarray) -> Float64[np.ndarray, "S S 3"]:
+    return np.asarray(base * (1.0 - fraction[..., None]) + other * fraction[..., None])
 
 
 def _band(coordinate: np.ndarray, count: int, width: float) -> np.ndarray:
@@ -74,17 +74,17 @@ def _stripes(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> n
 def _checks(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     column, row = _grid()
     thick, thin = int(rng.integers(3, 6)), float(rng.uniform(0.06, 0.12))
-    share = 0.55 * (_band(column, thick, 0.42) + _band(row, thick, 0.42)) * 0.8
+    fraction = 0.55 * (_band(column, thick, 0.42) + _band(row, thick, 0.42)) * 0.8
     light = np.maximum(_band(column + 0.5 / thick, thick, thin), _band(row + 0.5 / thick, thick, thin))
-    colour = _mix(_mix(base, other, np.clip(share, 0.0, 0.95)), np.full(3, 0.75), 0.7 * light)
+    colour = _mix(_mix(base, other, np.clip(fraction, 0.0, 0.95)), np.full(3, 0.75), 0.7 * light)
     return np.asarray(colour * _weave(rng)[..., None])
 
 
 def _gingham(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     column, row = _grid()
     count = int(rng.integers(8, 14))
-    share = 0.5 * (_band(column, count, 0.5) + _band(row, count, 0.5))
-    return np.asarray(_mix(np.maximum(base, 0.55), other, share) * _weave(rng)[..., None])
+    fraction = 0.5 * (_band(column, count, 0.5) + _band(row, count, 0.5))
+    return np.asarray(_mix(np.maximum(base, 0.55), other, fraction) * _weave(rng)[..., None])
 
 
 def _denim(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -92,8 +92,8 @@ def _denim(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> np.
     twill = 0.5 + 0.5 * np.sin(2.0 * np.pi * 64 * (column + row))
     yarn = rng.normal(0.0, 0.045, SIZE_PX)[None, :] + 0.05 * tileable_noise(rng, SIZE_PX, 60, 2)
     fade = 0.018 * tileable_noise(rng, SIZE_PX, 3, 3)
-    share = np.clip(0.08 + 0.20 * twill + yarn + fade, 0.0, 1.0)
-    return _mix(base, np.array([0.30, 0.40, 0.56]), share)
+    fraction = np.clip(0.08 + 0.20 * twill + yarn + fade, 0.0, 1.0)
+    return _mix(base, np.array([0.30, 0.40, 0.56]), fraction)
 
 
 def _knit(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -112,16 +112,16 @@ def _dots(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> np.n
     count = 2 * int(rng.integers(3, 6))
     shifted = column * count + 0.5 * (np.floor(row * count) % 2)
     distance = np.hypot(shifted % 1.0 - 0.5, (row * count) % 1.0 - 0.5)
-    share = np.clip((0.2 - distance) * SIZE_PX / count / 2.0 + 0.5, 0.0, 1.0)
-    return np.asarray(_mix(base, other, share) * _weave(rng)[..., None])
+    fraction = np.clip((0.2 - distance) * SIZE_PX / count / 2.0 + 0.5, 0.0, 1.0)
+    return np.asarray(_mix(base, other, fraction) * _weave(rng)[..., None])
 
 
 def _print(base: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     blots = tileable_noise(rng, SIZE_PX, 5, 3)
     specks = tileable_noise(rng, SIZE_PX, 12, 2)
-    share = np.clip(6.0 * (blots - 0.5), 0.0, 1.0)
+    fraction = np.clip(6.0 * (blots - 0.5), 0.0, 1.0)
     third = np.clip(np.stack([other[1], other[2], other[0]]) * 0.8 + 0.1, 0.0, 1.0)
-    colour = _mix(_mix(base, other, share), third, np.clip(6.0 * (specks - 1.3), 0.0, 1.0))
+    colour = _mix(_mix(base, other, fraction), third, np.clip(6.0 * (specks - 1.3), 0.0, 1.0))
     return np.asarray(colour * _weave(rng)[..., None])
 
 

@@ -33,7 +33,7 @@ def _uneven(template_m: Places, rng: np.random.Generator) -> Values:
     return np.clip(0.65 + 0.4 * _noise(template_m, 0.16, rng), 0.0, 1.3)
 
 
-def _around(template_m: Places, centre_m: Float64[np.ndarray, "3"]) -> Values:
+def _azimuth_rad(template_m: Places, centre_m: Float64[np.ndarray, "3"]) -> Values:
     return np.arctan2(template_m[:, 1] - centre_m[1], template_m[:, 0] - centre_m[0])
 
 
@@ -51,7 +51,7 @@ def _fan(
 
 def _rings(template_m: Places, along_m: Values, wave_m: float, rng: np.random.Generator) -> Values:
     """Folds around a limb, aslant and not closed."""
-    slant = 1.4 * np.sin(_around(template_m, np.zeros(3)) + rng.uniform(0.0, 2.0 * np.pi))
+    slant = 1.4 * np.sin(_azimuth_rad(template_m, np.zeros(3)) + rng.uniform(0.0, 2.0 * np.pi))
     phase = 2.0 * np.pi * along_m / wave_m + slant + 1.5 * _noise(template_m, 0.14, rng)
     return _ridges(phase + rng.uniform(0.0, 2.0 * np.pi))
 
@@ -66,7 +66,7 @@ def top_folds(template_m: Places, arm: Values, long_sleeves: bool, rng: np.rando
     """
     height = template_m[:, 2]
     hanging = _ridges(
-        _around(template_m, np.array([0.04, 0.0, 0.0])) * rng.uniform(8.0, 11.0)
+        _azimuth_rad(template_m, np.array([0.04, 0.0, 0.0])) * rng.uniform(8.0, 11.0)
         + 1.3 * _noise(template_m, 0.30, rng)
         + rng.uniform(-6.0, 6.0) * height
     ) * np.interp(height, [0.0, 0.10, 0.30, 0.40], [1.0, 0.75, 0.35, 0.0])
@@ -91,7 +91,7 @@ def trouser_folds(template_m: Places, rng: np.random.Generator) -> Values:
     ankles = np.interp(below, [0.56, 0.68, 0.77, 0.84], [0.0, 0.7, 1.0, 0.5])
     pushed = _rings(template_m + 0.31 * side[:, None], below, 0.062, rng) * (knees + ankles)
     long_ones = 0.35 * _ridges(
-        _around(template_m - np.array([0.0, 0.1, 0.0]) * side[:, None], np.zeros(3)) * 4.0
+        _azimuth_rad(template_m - np.array([0.0, 0.1, 0.0]) * side[:, None], np.zeros(3)) * 4.0
         + 1.5 * _noise(template_m, 0.35, rng)
     )
     down = np.interp(below, [0.0, 0.1], [0.0, 1.0])
@@ -100,6 +100,6 @@ def trouser_folds(template_m: Places, rng: np.random.Generator) -> Values:
 
 def skirt_folds(template_m: Places, hem_z_m: float, rng: np.random.Generator) -> Values:
     """Folds of a skirt, about -1 to 1, deeper towards the hem."""
-    around = _around(template_m, np.array([0.02, 0.0, 0.0]))
-    phase = around * float(rng.integers(9, 14)) + 0.9 * _noise(template_m, 0.35, rng)
+    azimuth_rad = _azimuth_rad(template_m, np.array([0.02, 0.0, 0.0]))
+    phase = azimuth_rad * float(rng.integers(9, 14)) + 0.9 * _noise(template_m, 0.35, rng)
     return np.asarray(_ridges(phase) * np.interp(template_m[:, 2], [hem_z_m, -0.05, 0.06], [1.0, 0.35, 0.0]))

@@ -19,7 +19,7 @@ _MOST_BYTES = 64 * 1024 * 1024
 _BASE_MESH = "hm08"
 _DEFAULT_DEPTH = 50
 _SCALES = ("x_scale", "y_scale", "z_scale")
-# One bound vertex, three with shares, or three with shares and an offset.
+# One bound vertex, three with weights, or three with weights and an offset.
 _BINDING_SIZES = (1, 6, 9)
 
 
@@ -34,7 +34,7 @@ class AxisScale:
 
 @dataclass(frozen=True)
 class Binding:
-    """A garment's vertices by three base vertices each: shares of their places, and an offset in decimetres.
+    """A garment's vertices by three base vertices each: the weights of their places, and an offset in decimetres.
 
     ``scales`` are those of MakeHuman's X, Y and Z; None leaves offsets as they are. ``hides`` marks base vertices
     that the garment covers. Garments of higher ``depth`` lie over those of lower.
@@ -44,7 +44,7 @@ class Binding:
     name: str
     tags: tuple[str, ...]
     base_vertices: Int32[np.ndarray, "P 3"]
-    shares: Float64[np.ndarray, "P 3"]
+    corner_weights: Float64[np.ndarray, "P 3"]
     offset_dm: Float64[np.ndarray, "P 3"]
     scales: tuple[AxisScale | None, AxisScale | None, AxisScale | None]
     hides: Bool[np.ndarray, " B"]
@@ -177,9 +177,9 @@ def read_binding(path: Path, root: Path) -> Binding:
             tags.append(rest.lower())
     if not rows or "obj_file" not in files:
         raise AssetError(f"'{path}' must have a line obj_file and bound vertices after a line 'verts': mend the file")
-    corners, shares, offsets = zip(*rows, strict=True)
+    corners, weights, offsets = zip(*rows, strict=True)
     return Binding(
-        path, name, tuple(tags), np.array(corners, dtype=np.int32), np.array(shares), np.array(offsets),
+        path, name, tuple(tags), np.array(corners, dtype=np.int32), np.array(weights), np.array(offsets),
         (scales.get("x_scale"), scales.get("y_scale"), scales.get("z_scale")),
         hides, depth, files["obj_file"], files.get("material"),
     )  # fmt: skip

@@ -15,8 +15,8 @@ from perpetua.errors import AssetError
 _IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tga", ".bmp")
 _MOST_TEXELS = 8192 * 8192
 _LARGEST_PX = 1024
-# A texel counts as there from this much opacity on, a triangle from this share of such texels on.
-_OPAQUE, _LEAST_SHARE = 96, 0.4
+# A texel counts as there from this much opacity on, a triangle from this fraction of such texels on.
+_OPAQUE, _LEAST_FRACTION = 96, 0.4
 
 
 @dataclass(frozen=True)
@@ -130,13 +130,13 @@ def load_look(described: MaterialFile) -> Look:
     return Look(described.name, described.tags, described.colour, 1.0 - 0.6 * described.shininess, image, there, shade)
 
 
-def _share_there(there: Bool[np.ndarray, "H W"], uv: Float64[np.ndarray, "F 3 2"]) -> Float64[np.ndarray, " F"]:
+def _opaque_fraction(there: Bool[np.ndarray, "H W"], uv: Float64[np.ndarray, "F 3 2"]) -> Float64[np.ndarray, " F"]:
     """Share of opaque texels in each triangle, by 36 samples spread over it."""
     steps = 8
     pairs = [(i, j) for i in range(steps) for j in range(steps - i)]
     first, second = (np.array([pair[axis] + 1.0 / 3.0 for pair in pairs]) / steps for axis in range(2))
-    shares = np.stack([1.0 - first - second, first, second], axis=1)
-    place = np.einsum("sc,fcd->fsd", shares, uv)
+    corner_weights = np.stack([1.0 - first - second, first, second], axis=1)
+    place = np.einsum("sc,fcd->fsd", corner_weights, uv)
     height, width = there.shape
     column = np.floor(place[..., 0] * width).astype(np.int64) % width
     row = np.floor((1.0 - place[..., 1]) * height).astype(np.int64) % height
@@ -145,7 +145,7 @@ def _share_there(there: Bool[np.ndarray, "H W"], uv: Float64[np.ndarray, "F 3 2"
 
 @dataclass(frozen=True)
 class Cut:
-    """A mesh whose transparent parts are gone. ``from_old`` gives each vertex as shares of two old ones.
+    """A mesh whose transparent parts are gone. ``from_old`` gives each vertex as a mix of two old ones.
 
     New vertices lie in the middle of old edges: vertex p is the mean of old vertices ``from_old[p]``.
     """
@@ -182,9 +182,9 @@ def without_transparent(
     Triangles without an opaque texel go; those with some of both are split into four, of which the ones that are
     mostly transparent go. What stays is opaque.
     """
-    share = _share_there(there, uv.astype(np.float64))
-    mixed = (share > 0.0) & (share < 1.0)
+    fraction = _opaque_fraction(there, uv.astype(np.float64))
+    mixed = (fraction > 0.0) & (fraction < 1.0)
     cut = _quartered(faces[mixed], uv[mixed], count)
-    kept = _share_there(there, cut.uv.astype(np.float64)) >= _LEAST_SHARE
-    whole = share == 1.0
+    kept = _opaque_fraction(there, cut.uv.astype(np.float64)) >= _LEAST_FRACTION
+    whole = fraction == 1.0
     return Cut(np.concatenate([faces[whole], cut.faces[kept]]), np.concatenate([uv[whole], cut.uv[kept]]), cut.from_old)

@@ -62,7 +62,7 @@ _JACKETS: dict[str, TopPattern] = {
     "cardigan": TopPattern(0.468, -0.050, 0.150, True, "none", 0.022, 0.0050, 0.009, 0.028),
 }
 # What a jacket may be worn over, and how often one is.
-_UNDER_JACKETS, _JACKET_SHARE = ("T-shirt", "V-neck T-shirt"), 0.6
+_UNDER_JACKETS, _JACKET_FRACTION = ("T-shirt", "V-neck T-shirt"), 0.6
 _JACKET_FABRICS = {"jacket": ("plain", "denim", "heather", "checks"), "cardigan": ("knit",)}
 _JACKET_DYES = ("navy", "charcoal", "olive", "beige", "brown", "grey", "burgundy")
 _BODICES = (
@@ -72,7 +72,7 @@ _BODICES = (
 )
 _DRESS_SKIRT = SkirtPattern(0.125, -0.400, 0.004, 0.003)
 _DRESS_FABRICS = ("print", "dots", "plain", "checks", "stripes")
-_DRESS_SHARE = 0.3
+_DRESS_FRACTION = 0.3
 _TOP_FABRICS: dict[str, tuple[str, ...]] = {
     "T-shirt": ("stripes", "plain", "print", "heather"),
     "V-neck T-shirt": ("plain", "stripes", "dots", "print"),
@@ -166,9 +166,9 @@ def draw_outfit(actor: int, female: bool, seed: StageSeed) -> Outfit:
     jacket = _pick(tuple(_JACKETS), rng)
     jacket_cloth = Cloth(_pick(_JACKET_FABRICS[jacket], rng), _pick(_JACKET_DYES, rng), "beige")
     lower: TrouserPattern | SkirtPattern
-    wears_jacket = top in _UNDER_JACKETS and rng.random() < _JACKET_SHARE
+    wears_jacket = top in _UNDER_JACKETS and rng.random() < _JACKET_FRACTION
     over = f" under a {jacket_cloth.base} {jacket_cloth.fabric} {jacket}" if wears_jacket else ""
-    if female and rng.random() < _DRESS_SHARE:
+    if female and rng.random() < _DRESS_FRACTION:
         cloth = Cloth(_pick(_DRESS_FABRICS, rng), dye, other)
         bodice = _BODICES[int(rng.integers(len(_BODICES)))]
         upper, lower, lower_cloth = bodice, _DRESS_SKIRT, cloth

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from perpetua.actors.base.rig import joint_index
-from perpetua.actors.base.wearer import along_arm_m, along_leg_m, arm_share, template_joints
+from perpetua.actors.base.wearer import along_arm_m, along_leg_m, arm_weight, template_joints
 
 # Skin is hidden where cloth covers it by more than this: nobody looks further up a sleeve.
 COVERED_MARGIN_M = 0.030
@@ -72,7 +72,7 @@ def top_field_m(
     pattern: TopPattern, template_m: Float64[np.ndarray, "P 3"], weights: Float64[np.ndarray, "P J"]
 ) -> Float64[np.ndarray, " P"]:
     """Metres inside the top's cut lines, on the base mesh; negative outside."""
-    arm = arm_share(weights) > 0.4
+    arm = arm_weight(weights) > 0.4
     sleeve = np.where(arm, pattern.sleeve_m - along_arm_m(template_m), _FAR_M)
     hem = np.where(arm, _FAR_M, template_m[:, 2] - pattern.hem_z_m)
     head = weights[:, joint_index("head")] > 0.5
@@ -108,7 +108,7 @@ def trouser_field_m(
     # Long legs end above the floor, in front above the instep.
     ahead_m = np.maximum(template_m[:, 0] - template_joints()[joint_index("left_ankle"), 0] - 0.02, 0.0)
     inside = np.minimum(inside, template_m[:, 2] - _LOWEST_HEM_Z_M - 0.55 * ahead_m)
-    return np.where(arm_share(weights) > 0.3, -_FAR_M, inside)
+    return np.where(arm_weight(weights) > 0.3, -_FAR_M, inside)
 
 
 def skirt_field_m(
@@ -116,7 +116,7 @@ def skirt_field_m(
 ) -> Float64[np.ndarray, " P"]:
     """Metres inside the skirt's cut lines, on the base mesh; negative outside."""
     inside = np.minimum(pattern.waist_z_m - template_m[:, 2], template_m[:, 2] - pattern.hem_z_m)
-    return np.where(arm_share(weights) > 0.3, -_FAR_M, inside)
+    return np.where(arm_weight(weights) > 0.3, -_FAR_M, inside)
 
 
 def covered_by(fields_m: tuple[Float64[np.ndarray, " P"], ...]) -> Bool[np.ndarray, " P"]:

@@ -78,8 +78,8 @@ def _measure(wearer: Wearer, side: str, pattern: ShoePattern) -> _Last:
     low = local[local[:, 2] < 0.055]
     start, end = low[:, 0].min() - 0.006, low[:, 0].max() + 0.012
     # Closer together at both ends, where the outline turns.
-    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _SECTIONS))
-    along = start + share * (end - start)
+    fraction = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _SECTIONS))
+    along = start + fraction * (end - start)
     reach = np.maximum(0.018, 0.06 * (end - start))
     lefts, rights, tops = np.empty(_SECTIONS), np.empty(_SECTIONS), np.empty(_SECTIONS)
     for index, place in enumerate(np.clip(along, low[:, 0].min() + reach, low[:, 0].max() - reach)):
@@ -93,9 +93,9 @@ def _measure(wearer: Wearer, side: str, pattern: ShoePattern) -> _Last:
 
 def _outline(last: _Last, pattern: ShoePattern) -> Float64[np.ndarray, " S"]:
     """Shares of the full width at each section: round at the heel, ``toe`` at the front."""
-    share = (last.along_m - last.along_m[0]) / (last.along_m[-1] - last.along_m[0])
-    heel = np.clip(share / 0.16, 0.0, 1.0)
-    front = np.clip((1.0 - share) / 0.26, 0.0, 1.0)
+    fraction = (last.along_m - last.along_m[0]) / (last.along_m[-1] - last.along_m[0])
+    heel = np.clip(fraction / 0.16, 0.0, 1.0)
+    front = np.clip((1.0 - fraction) / 0.26, 0.0, 1.0)
     rounded = (1.0 - (1.0 - heel) ** 2.2) ** (1.0 / 2.2)
     return np.asarray(rounded * (1.0 - (1.0 - front) ** pattern.toe) ** (1.0 / pattern.toe))
 
@@ -115,12 +115,12 @@ def _grid_faces(rows: int, columns: int) -> Int32[np.ndarray, "F 3"]:
 def _upper(last: _Last, pattern: ShoePattern) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices, faces and UVs of the upper: one arch from side to side at each section."""
     outline = _outline(last, pattern)
-    share = (last.along_m - last.along_m[0]) / (last.along_m[-1] - last.along_m[0])
-    toe_box = np.interp(share, [0.0, 0.75, 0.9, 1.0], [1.0, 1.0, 0.90, 0.45])
-    heel_box = np.interp(share, [0.0, 0.06, 0.14], [0.90, 0.98, 1.0])
+    fraction = (last.along_m - last.along_m[0]) / (last.along_m[-1] - last.along_m[0])
+    toe_box = np.interp(fraction, [0.0, 0.75, 0.9, 1.0], [1.0, 1.0, 0.90, 0.45])
+    heel_box = np.interp(fraction, [0.0, 0.06, 0.14], [0.90, 0.98, 1.0])
     top = np.maximum(last.top_m, 0.040) * toe_box * heel_box
     angle = np.linspace(0.0, np.pi, _ARCH)
-    squareness = 2.0 / np.interp(share, [0.0, 0.3, 1.0], [3.0, 2.6, 2.2])
+    squareness = 2.0 / np.interp(fraction, [0.0, 0.3, 1.0], [3.0, 2.6, 2.2])
     wide = np.sign(np.cos(angle)) * np.abs(np.cos(angle)) ** squareness[:, None]
     high = np.sin(angle) ** squareness[:, None]
     width = np.where(wide > 0, last.to_right_m[:, None], last.to_left_m[:, None])
@@ -132,7 +132,7 @@ def _upper(last: _Last, pattern: ShoePattern) -> tuple[np.ndarray, np.ndarray, n
     fan = np.stack([np.zeros(_ARCH - 2, int), np.arange(1, _ARCH - 1), np.arange(2, _ARCH)], axis=1)
     front = fan + (_SECTIONS - 1) * _ARCH
     faces = np.concatenate([_grid_faces(_SECTIONS, _ARCH), fan[:, ::-1], front]).astype(np.int32)
-    flat = np.stack([np.repeat(share, _ARCH), np.tile(angle / np.pi, _SECTIONS)], axis=1)
+    flat = np.stack([np.repeat(fraction, _ARCH), np.tile(angle / np.pi, _SECTIONS)], axis=1)
     return vertices, faces, flat[faces].astype(np.float32)
 
 
@@ -155,8 +155,8 @@ def _sole(last: _Last, pattern: ShoePattern) -> tuple[np.ndarray, np.ndarray, np
     bottom = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     vertices = np.concatenate(rows)
     faces = np.concatenate([wall, bottom]).astype(np.int32)
-    around = np.tile(np.linspace(0.0, 4.0, columns), len(rows))
-    flat = np.stack([around, np.repeat(np.linspace(0.0, 0.3, len(rows)), columns)], axis=1)
+    along_edge = np.tile(np.linspace(0.0, 4.0, columns), len(rows))
+    flat = np.stack([along_edge, np.repeat(np.linspace(0.0, 0.3, len(rows)), columns)], axis=1)
     return vertices, faces, flat[faces].astype(np.float32)
 
 
@@ -225,8 +225,8 @@ def make_shoes(wearer: Wearer, pattern: ShoePattern, rng: np.random.Generator) -
         length = last.along_m[-1] - last.along_m[0]
         under = np.array([-pattern.sole_m])
         middle = 0.5 * (last.to_left_m - last.to_right_m)
-        for points, share in ((heels, 0.03), (toes, 0.88)):
-            along = np.array([last.along_m[0] + share * length])
+        for points, fraction in ((heels, 0.03), (toes, 0.88)):
+            along = np.array([last.along_m[0] + fraction * length])
             points.append(_place(last, along, np.interp(along, last.along_m, middle), under)[0])
         floor_z_m += 0.5 * float(last.origin_m[2] - pattern.sole_m)
     piece = Piece(np.concatenate(vertices), np.concatenate(weights), tuple(parts))

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from perpetua.actors.base.piece import Piece, Surface
 from perpetua.actors.base.rig import joint_index
 from perpetua.actors.base.surface import averaging, border_edges, positive, split
-from perpetua.actors.base.wearer import Wearer, along_arm_m, along_leg_m, arm_share, refined_group
+from perpetua.actors.base.wearer import Wearer, along_arm_m, along_leg_m, arm_weight, refined_group
 from perpetua.actors.clothing.collar import collar
 from perpetua.actors.clothing.details import back_pockets_m, buttons, chest_pocket_m, joined, patch, placket
 from perpetua.actors.clothing.drape import Drape, draped, hemmed, smooth_normals
@@ -23,7 +23,7 @@ from perpetua.actors.clothing.patterns import (
     top_field_m,
     trouser_field_m,
 )
-from perpetua.actors.clothing.unwrap import around, front_m, limbs, trunk
+from perpetua.actors.clothing.unwrap import front_m, limbs, trunk, unrolled
 from perpetua.scene.actor import ActorPart
 from perpetua.scene.room import Material
 
@@ -50,11 +50,11 @@ def _material(name: str, fabric: Fabric) -> Material:
 
 
 def _onto(weights: Float64[np.ndarray, "P J"], moves: dict[str, tuple[str, float]]) -> Float64[np.ndarray, "P J"]:
-    """Moves a share of one joint's weight to another joint of its side, or to the pelvis."""
+    """Moves a fraction of one joint's weight to another joint of its side, or to the pelvis."""
     moved = weights.copy()
-    for source, (goal, share) in moves.items():
+    for source, (goal, fraction) in moves.items():
         for side in ("left", "right"):
-            part = share * moved[:, joint_index(f"{side}_{source}")]
+            part = fraction * moved[:, joint_index(f"{side}_{source}")]
             moved[:, joint_index(f"{side}_{source}")] -= part
             moved[:, joint_index(goal if goal == "pelvis" else f"{side}_{goal}")] += part
     return moved
@@ -83,15 +83,15 @@ def _top_ease_m(pattern: TopPattern, surface: Surface) -> Float64[np.ndarray, " 
     along = along_arm_m(surface.template_m) / max(pattern.sleeve_m, 0.1)
     end = 0.85 if pattern.sleeve_m < _SHORT_SLEEVE_M else 0.45
     sleeve = np.interp(along, [0.0, 0.3, 0.7, 1.0], [0.25, 0.7, 0.9, end])
-    arm = arm_share(surface.weights)
+    arm = arm_weight(surface.weights)
     return pattern.ease_m * ((1.0 - arm) * body + arm * sleeve)
 
 
 def _top_hold(pattern: TopPattern, surface: Surface, field_m: Float64[np.ndarray, " P"]) -> Float64[np.ndarray, " P"]:
     """Tops hang from the shoulders; ribbed hems and cuffs stay where they are, others hardly."""
     shoulders = np.interp(surface.template_m[:, 2], [0.38, 0.50], [0.06, 0.30])
-    cuff = np.clip(1.0 - field_m / 0.04, 0.0, 1.0) * (pattern.sleeve_m > _SHORT_SLEEVE_M) * arm_share(surface.weights)
-    band = np.clip(1.0 - field_m / 0.04, 0.0, 1.0) * (1.0 - arm_share(surface.weights)) * (pattern.thickness_m > 0.004)
+    cuff = np.clip(1.0 - field_m / 0.04, 0.0, 1.0) * (pattern.sleeve_m > _SHORT_SLEEVE_M) * arm_weight(surface.weights)
+    band = np.clip(1.0 - field_m / 0.04, 0.0, 1.0) * (1.0 - arm_weight(surface.weights)) * (pattern.thickness_m > 0.004)
     return np.maximum(shoulders, 0.25 * np.maximum(cuff, band))
 
 
@@ -102,13 +102,13 @@ def sew_top(
     tights = refined_group(wearer, "helper-tights")
     cut, _ = positive(tights, top_field_m(pattern, tights.template_m, tights.weights))
     # Armholes, sides and shoulders are seams: cloth is cut there, so that each panel has its own grain.
-    cut, _ = split(cut, arm_share(cut.weights) - 0.5)
+    cut, _ = split(cut, arm_weight(cut.weights) - 0.5)
     seamed, _ = split(cut, front_m(cut.template_m))
     field_m = _edged(seamed, top_field_m(pattern, seamed.template_m, seamed.weights))
     ease_m = _top_ease_m(pattern, seamed)
     gap_m = 0.30 * pattern.ease_m + 0.002 + 0.007 * np.clip((0.16 - seamed.template_m[:, 2]) / 0.08, 0.0, 1.0)
     edge = np.clip(field_m / 0.03, 0.0, 1.0)
-    arm = arm_share(seamed.weights)
+    arm = arm_weight(seamed.weights)
     long_sleeves = pattern.sleeve_m > _SHORT_SLEEVE_M
     fold_m = pattern.fold_m * (0.35 + 0.65 * edge) * top_folds(seamed.template_m, arm, long_sleeves, rng)
     # Below the chest a top spans hollows; sleeves and shoulders fit.
@@ -118,7 +118,7 @@ def sew_top(
     moves = {"wrist": _CUFF_MOVE, "hip": _HEM_MOVES[pattern.hem_z_m > _AT_WAIST_Z_M]}
     outside = replace(seamed, vertices_m=cloth_m, weights=_onto(_eased_weights(seamed, 6), moves))
     sewn = hemmed(outside, field_m, _HEM_M, pattern.thickness_m)
-    on_arm = arm_share(_template_weights(sewn, seamed))[sewn.faces].mean(axis=1) > 0.5
+    on_arm = arm_weight(_template_weights(sewn, seamed))[sewn.faces].mean(axis=1) > 0.5
     uv = trunk(sewn)
     uv[on_arm] = limbs(sewn, ("shoulder", "elbow", "wrist"), _ARM_RADIUS_M, (0.0, -0.7, -0.7))[on_arm]
     shown = np.ones(len(sewn.faces), dtype=bool) if over is None else ~_hidden_by(over, sewn)
@@ -214,7 +214,7 @@ def sew_skirt(
     folded = replace(cut, vertices_m=eased_m + height_m[:, None] * outward)
     sewn = hemmed(replace(folded, weights=_skirt_weights(cut)), field_m, _HEM_M, pattern.thickness_m)
     middle = np.array([0.02, 0.0, 0.1])
-    uv = around(
+    uv = unrolled(
         sewn.template_m,
         sewn.faces,
         middle,

@@ -15,7 +15,7 @@ _TRUNK_CENTRE_M = (0.017, 0.016, 0.033, 0.046, 0.060, 0.063, 0.057, 0.034, 0.022
 _YOKE_Z_M = 0.44
 
 
-def around(
+def unrolled(
     template_m: Float64[np.ndarray, "P 3"],
     faces: Int32[np.ndarray, "F 3"],
     start_m: Float64[np.ndarray, "3"],
@@ -56,7 +56,7 @@ def limbs(
         start, bend, end = (joints[joint_index(f"{side}_{name}")] for name in chain)
         towards = np.array(seam) * np.array([1.0, mirror, 1.0])
         straight_m = _straightened(surface.template_m, start, bend, end)
-        uv[chosen] = around(straight_m, surface.faces[chosen], start, end, towards, radius_m)
+        uv[chosen] = unrolled(straight_m, surface.faces[chosen], start, end, towards, radius_m)
     return uv
 
 
@@ -71,8 +71,8 @@ def _straightened(
     axis = (end_m - start_m) / length_m
     at_bend_m = float((bend_m - start_m) @ axis)
     aside_m = bend_m - start_m - at_bend_m * axis
-    share = np.interp((template_m - start_m) @ axis, [0.0, at_bend_m, length_m], [0.0, 1.0, 0.0])
-    return np.asarray(template_m - share[:, None] * aside_m)
+    fraction = np.interp((template_m - start_m) @ axis, [0.0, at_bend_m, length_m], [0.0, 1.0, 0.0])
+    return np.asarray(template_m - fraction[:, None] * aside_m)
 
 
 def front_m(template_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, " P"]:

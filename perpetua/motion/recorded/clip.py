@@ -74,8 +74,8 @@ def resample_rotations(
     """
     last = len(rotation) - 1
     low = np.clip(np.floor(row).astype(int), 0, max(last - 1, 0))
-    share = np.clip(row - low, 0.0, 1.0)[:, None, None, None]
-    mixed = (1.0 - share) * rotation[low] + share * rotation[np.minimum(low + 1, last)]
+    weight = np.clip(row - low, 0.0, 1.0)[:, None, None, None]
+    mixed = (1.0 - weight) * rotation[low] + weight * rotation[np.minimum(low + 1, last)]
     first, second = mixed[..., 0], mixed[..., 1]
     first = first / np.linalg.norm(first, axis=-1, keepdims=True)
     second = second - np.sum(first * second, axis=-1, keepdims=True) * first
@@ -84,12 +84,12 @@ def resample_rotations(
 
 
 def mix_rotations(
-    start: Float64[np.ndarray, "N J 3 3"], end: Float64[np.ndarray, "N J 3 3"], share: Float64[np.ndarray, " N"]
+    start: Float64[np.ndarray, "N J 3 3"], end: Float64[np.ndarray, "N J 3 3"], weight: Float64[np.ndarray, " N"]
 ) -> Float64[np.ndarray, "N J 3 3"]:
-    """Each row a share of its own (0 to 1) of the way from ``start`` to ``end``."""
+    """Each row a fraction of its own (0 to 1) of the way from ``start`` to ``end``."""
     shape = start.shape
     turn = Rotation.from_matrix((np.swapaxes(start, -1, -2) @ end).reshape(-1, 3, 3)).as_rotvec()
-    part = Rotation.from_rotvec(turn * np.repeat(share, shape[1])[:, None]).as_matrix().reshape(shape)
+    part = Rotation.from_rotvec(turn * np.repeat(weight, shape[1])[:, None]).as_matrix().reshape(shape)
     return np.asarray(start @ part)
 
 

@@ -7,13 +7,15 @@ import numpy as np
 
 from perpetua.errors import AssetError
 from perpetua.machine.assets import asset_folder, file_listing
+from perpetua.motion.clock import MARGIN_S, make_clock
 from perpetua.motion.config import ClipsConfig, MotionConfig
 from perpetua.motion.path import RoutePath
-from perpetua.motion.recorded.body import body_along
+from perpetua.motion.recorded.body import WarpedClip, body_along
 from perpetua.motion.recorded.library import clip_files, load_clip, ranked_clips
 from perpetua.motion.recorded.loop import neutral_pose, standing_part, stretched, walking_part
-from perpetua.motion.recorded.ride import MARGIN_S, Going, going_along, make_clock, ride_along, rows_needed
-from perpetua.motion.recorded.tape import Tape, make_tape
+from perpetua.motion.recorded.reference import ReferenceTrajectory, reference_along
+from perpetua.motion.recorded.retargeted import RetargetedClip, retarget
+from perpetua.motion.recorded.time_warp import fit_time_warp, rows_needed
 from perpetua.scene.actor import BodyMotion, Route, Skeleton
 from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
@@ -30,8 +32,8 @@ _SAME_PACE = 0.29
 class _Chosen:
     """The part that is played along the route, and the one for pauses (None: a pose between strides)."""
 
-    walking: Tape | None
-    standing: Tape | None
+    walking: RetargetedClip | None
+    standing: RetargetedClip | None
 
 
 class ClipMotion:
@@ -60,16 +62,16 @@ class ClipMotion:
         """
         from_start = config.clips.from_start
         clock = make_clock(len(route.heading_rad), fps, 0.0 if from_start else MARGIN_S)
-        going = going_along(RoutePath(route, fps), clock)
-        chosen = _choose(route, going, skeleton, config.clips, seed.stream("clips", route.actor))
+        reference = reference_along(RoutePath(route, fps), clock)
+        chosen = _choose(route, reference, skeleton, config.clips, seed.stream("clips", route.actor))
         part = chosen.walking if chosen.walking is not None else chosen.standing
         if part is None:
             raise AssetError(_nothing_fits(config.clips, "stands or walks"))
-        share = 0.0 if from_start else float(seed.stream("clip start", route.actor).uniform())
-        tape = stretched(part, rows_needed(going, part, clock), skeleton, share)
-        ride = ride_along(tape, going, clock)
-        standing = neutral_pose(tape) if chosen.standing is None else chosen.standing
-        return body_along(tape, standing, ride, going, clock, skeleton, route.actor, fps)
+        start_fraction = 0.0 if from_start else float(seed.stream("clip start", route.actor).uniform())
+        retargeted = stretched(part, rows_needed(reference, part, clock), skeleton, start_fraction)
+        warp = fit_time_warp(retargeted, reference, clock)
+        standing = neutral_pose(retargeted) if chosen.standing is None else chosen.standing
+        return body_along(WarpedClip(retargeted, standing, warp), reference, clock, skeleton, route.actor)
 
 
 def clip_folder(config: ClipsConfig) -> Path:
@@ -82,19 +84,21 @@ def clip_listing(config: MotionConfig) -> list[str]:
     return file_listing(clip_folder(config.clips)) if config.source == "clips" else []
 
 
-def _choose(route: Route, going: Going, skeleton: Skeleton, config: ClipsConfig, rng: np.random.Generator) -> _Chosen:
+def _choose(
+    route: Route, reference: ReferenceTrajectory, skeleton: Skeleton, config: ClipsConfig, rng: np.random.Generator
+) -> _Chosen:
     """The first group of clips that fit equally well and hold what is needed decides, in it the nearest pace."""
-    goes = going.speed_mps[going.speed_mps > _GOING_MPS]
+    goes = reference.speed_mps[reference.speed_mps > _GOING_MPS]
     wanted_mps = float(np.median(goes)) if len(goes) > 0 else None
-    walking: Tape | None = None
-    standing: Tape | None = None
+    walking: RetargetedClip | None = None
+    standing: RetargetedClip | None = None
     nearest, left = np.inf, _MOST_TRIED
     for group in ranked_clips(clip_files(clip_folder(config)), route.description, rng):
         for path in group[:left]:
             left -= 1
-            tape = make_tape(load_clip(path, config.up), skeleton)
-            standing = standing_part(tape) if standing is None else standing
-            walk = walking_part(tape)
+            retargeted = retarget(load_clip(path, config.up), skeleton)
+            standing = standing_part(retargeted) if standing is None else standing
+            walk = walking_part(retargeted)
             apart = _pace_apart(walk, wanted_mps)
             walking, nearest = (walk, apart) if apart < nearest else (walking, nearest)
             if nearest < _SAME_PACE:
@@ -106,7 +110,7 @@ def _choose(route: Route, going: Going, skeleton: Skeleton, config: ClipsConfig,
     return _Chosen(walking, standing)
 
 
-def _pace_apart(walk: Tape | None, wanted_mps: float | None) -> float:
+def _pace_apart(walk: RetargetedClip | None, wanted_mps: float | None) -> float:
     """Natural logarithm of the ratio of paces; infinite for what does not walk."""
     if walk is None:
         return float("inf")

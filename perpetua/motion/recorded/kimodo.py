@@ -3,14 +3,16 @@
 import numpy as np
 
 from perpetua.errors import ActorError
+from perpetua.motion.clock import make_clock
 from perpetua.motion.config import KimodoConfig, MotionConfig
 from perpetua.motion.path import RoutePath
-from perpetua.motion.recorded.body import body_along
+from perpetua.motion.recorded.body import WarpedClip, body_along
 from perpetua.motion.recorded.clip import Clip
-from perpetua.motion.recorded.kimodo_files import KIMODO_FPS, LEAD_S, Wish, make_wish
+from perpetua.motion.recorded.kimodo_files import KIMODO_FPS, LEAD_S, KimodoRequest, make_request
 from perpetua.motion.recorded.kimodo_program import generate, kimodo_program
-from perpetua.motion.recorded.ride import going_facing, make_clock, real_time
-from perpetua.motion.recorded.tape import make_tape
+from perpetua.motion.recorded.reference import reference_facing
+from perpetua.motion.recorded.retargeted import retarget
+from perpetua.motion.recorded.time_warp import no_warp
 from perpetua.scene.actor import BodyMotion, Route, Skeleton
 from perpetua.scene.room import Room
 from perpetua.seeding import StageSeed
@@ -43,21 +45,21 @@ class KimodoMotion:
             ActorError: the generated path is too far from the route.
         """
         path = RoutePath(route, fps)
-        wish = make_wish(route.description, path)
-        clip = generate(wish, config.kimodo, int(seed.stream("kimodo", route.actor).integers(_SEEDS)))
-        _check_path(clip, wish, route.actor, config.kimodo)
+        request = make_request(route.description, path)
+        clip = generate(request, config.kimodo, int(seed.stream("kimodo", route.actor).integers(_SEEDS)))
+        _check_path(clip, request, route.actor, config.kimodo)
         # Whole frames within what was made beyond the ends of the route.
         margin_s = np.floor(LEAD_S * fps) / fps
         clock = make_clock(len(route.heading_rad), fps, margin_s, margin_s)
-        tape, ride = make_tape(clip, skeleton), real_time(clock, LEAD_S)
-        going = going_facing(path, clock, tape, ride)
-        return body_along(tape, None, ride, going, clock, skeleton, route.actor, fps)
+        retargeted, warp = retarget(clip, skeleton), no_warp(clock, LEAD_S)
+        reference = reference_facing(path, clock, retargeted, warp.row)
+        return body_along(WarpedClip(retargeted, None, warp), reference, clock, skeleton, route.actor)
 
 
-def _check_path(clip: Clip, wish: Wish, actor: int, config: KimodoConfig) -> None:
+def _check_path(clip: Clip, request: KimodoRequest, actor: int, config: KimodoConfig) -> None:
     """Raises ActorError where the pelvis strays from the path that was asked for."""
-    frames = min(len(clip.pelvis), len(wish.place_m))
-    away_m = np.linalg.norm(clip.pelvis[:frames, :2] - wish.place_m[:frames, :2], axis=1)
+    frames = min(len(clip.pelvis), len(request.place_m))
+    away_m = np.linalg.norm(clip.pelvis[:frames, :2] - request.place_m[:frames, :2], axis=1)
     farthest = int(away_m.argmax())
     if away_m[farthest] > config.max_path_error_m:
         raise ActorError(

@@ -34,7 +34,7 @@ SUPPORTED = "its SOMA models (Kimodo-SOMA-RP-v1, Kimodo-SOMA-SEED-v1) and Kimodo
 
 
 @dataclass(frozen=True)
-class Wish:
+class KimodoRequest:
     """A sequence to be made: sentences, how many frames each lasts, and where the body is at each frame.
 
     ``place_m`` and ``heading_rad`` are ours; ``local_m`` and ``turn_rad`` the same from the first frame: forward and
@@ -79,18 +79,18 @@ class Wish:
         return json.dumps([path])
 
 
-def make_wish(description: str, path: RoutePath) -> Wish:
+def make_request(description: str, path: RoutePath) -> KimodoRequest:
     """What to ask for so that a body does what is described along a route."""
     total = max(_FEWEST_FRAMES, int(np.ceil((path.end_s + 2.0 * LEAD_S) * KIMODO_FPS)) + 1)
     sentences = _sentences(description)[: total // _FEWEST_FRAMES]
     prompts: list[str] = []
     frames: list[int] = []
-    for sentence, count in zip(sentences, _shares(total, len(sentences)), strict=True):
-        pieces = _shares(count, int(np.ceil(count / _MOST_FRAMES)))
+    for sentence, count in zip(sentences, _split_evenly(total, len(sentences)), strict=True):
+        pieces = _split_evenly(count, int(np.ceil(count / _MOST_FRAMES)))
         prompts += [sentence] * len(pieces)
         frames += pieces
     time_s = np.arange(total) / KIMODO_FPS - LEAD_S
-    return Wish(tuple(prompts), tuple(frames), path.position_m(time_s), path.heading_rad(time_s))
+    return KimodoRequest(tuple(prompts), tuple(frames), path.position_m(time_s), path.heading_rad(time_s))
 
 
 def _sentences(description: str) -> list[str]:
@@ -107,12 +107,12 @@ def _about_a_person(sentence: str) -> str:
     return f"A person {sentence[0].lower()}{sentence[1:]}"
 
 
-def _shares(total: int, count: int) -> list[int]:
+def _split_evenly(total: int, count: int) -> list[int]:
     edges = [round(total * index / count) for index in range(count + 1)]
     return [end - start for start, end in pairwise(edges)]
 
 
-def read_result(folder: Path, stem: str, wish: Wish) -> Clip:
+def read_result(folder: Path, stem: str, request: KimodoRequest) -> Clip:
     """What Kimodo wrote, put back to where the route is: ``<stem>.npz``, else ``<stem>_amass.npz``.
 
     Raises:
@@ -120,7 +120,7 @@ def read_result(folder: Path, stem: str, wish: Wish) -> Clip:
     """
     own, amass = folder / f"{stem}.npz", folder / f"{stem}_amass.npz"
     if own.exists():
-        return read_kimodo(own, wish)
+        return read_kimodo(own, request)
     if not amass.exists():
         raise AssetError(f"Kimodo finished and wrote neither '{own.name}' nor '{amass.name}': is it version 1?")
     clip = read_amass(amass, "z")
@@ -128,11 +128,11 @@ def read_result(folder: Path, stem: str, wish: Wish) -> Clip:
     turned = Rotation.from_euler("z", -90.0, degrees=True).as_matrix()
     pelvis_m = clip.pelvis @ turned.T
     pelvis_m[:, :2] -= pelvis_m[0, :2]
-    _check_frames(len(pelvis_m), amass, wish)
-    return _placed(replace(clip, world_from_joint=turned @ clip.world_from_joint, pelvis=pelvis_m), wish)
+    _check_frames(len(pelvis_m), amass, request)
+    return _placed(replace(clip, world_from_joint=turned @ clip.world_from_joint, pelvis=pelvis_m), request)
 
 
-def read_kimodo(path: Path, wish: Wish) -> Clip:
+def read_kimodo(path: Path, request: KimodoRequest) -> Clip:
     """Kimodo's own .npz file, put back to where the route is.
 
     Raises:
@@ -144,7 +144,7 @@ def read_kimodo(path: Path, wish: Wish) -> Clip:
         raise AssetError(f"'{path}' lacks {sorted(missing)}: files of Kimodo 1 hold them; check the program's version")
     place, rotation = arrays["posed_joints"].astype(np.float64), arrays["global_rot_mats"].astype(np.float64)
     joints = _joints(place, rotation, arrays["foot_contacts"], path)
-    _check_frames(len(place), path, wish)
+    _check_frames(len(place), path, request)
     contacts = arrays["foot_contacts"].astype(np.float64) > 0.5
     place, rotation = place[:, joints], rotation[:, joints]
     for name, values in (("posed_joints", place), ("global_rot_mats", rotation)):
@@ -161,7 +161,7 @@ def read_kimodo(path: Path, wish: Wish) -> Clip:
         _leg_m(place),
         np.stack([contacts[:, :2].any(axis=1), contacts[:, 2:].any(axis=1)], axis=1),
     )
-    return _placed(ours, wish)
+    return _placed(ours, request)
 
 
 def _joints(place: np.ndarray, rotation: np.ndarray, contacts: np.ndarray, path: Path) -> list[int]:
@@ -187,15 +187,15 @@ def _leg_m(place: Float64[np.ndarray, "T 22 3"]) -> float:
     return float(np.median(length_m))
 
 
-def _check_frames(frames: int, path: Path, wish: Wish) -> None:
-    wanted = sum(wish.frames)
+def _check_frames(frames: int, path: Path, request: KimodoRequest) -> None:
+    wanted = sum(request.frames)
     if abs(frames - wanted) > 2:
         raise AssetError(f"'{path}' has {frames} frames; {wanted} were asked for")
 
 
-def _placed(clip: Clip, wish: Wish) -> Clip:
+def _placed(clip: Clip, request: KimodoRequest) -> Clip:
     """A clip that begins at the origin facing +X, moved to the route's beginning."""
-    turn = Rotation.from_euler("z", float(wish.heading_rad[0])).as_matrix()
+    turn = Rotation.from_euler("z", float(request.heading_rad[0])).as_matrix()
     moved = replace(clip, world_from_joint=turn @ clip.world_from_joint, pelvis=clip.pelvis @ turn.T)
-    moved.pelvis[:, :2] += wish.place_m[0, :2]
+    moved.pelvis[:, :2] += request.place_m[0, :2]
     return check_clip(moved)

@@ -1,4 +1,4 @@
-"""Kimodo as a program of its own, started once for each wish; what it made is kept."""
+"""Kimodo as a program of its own, started once for each request; what it made is kept."""
 
 import contextlib
 import hashlib
@@ -16,18 +16,18 @@ from perpetua.io.files import file_sha256
 from perpetua.machine.assets import asset_folder
 from perpetua.motion.config import KimodoConfig
 from perpetua.motion.recorded.clip import Clip
-from perpetua.motion.recorded.kimodo_files import SUPPORTED, TRANSITION_FRAMES, Wish, read_result
+from perpetua.motion.recorded.kimodo_files import SUPPORTED, TRANSITION_FRAMES, KimodoRequest, read_result
 
 _STEM = "motion"
 _RESULTS = (f"{_STEM}.npz", f"{_STEM}_amass.npz")
 _QUOTED_CHARACTERS = 2000
 
 
-def generate(wish: Wish, config: KimodoConfig, seed: int) -> Clip:
-    """What Kimodo makes of a wish, from the cache if it has made it before.
+def generate(request: KimodoRequest, config: KimodoConfig, seed: int) -> Clip:
+    """What Kimodo makes of a request, from the cache if it has made it before.
 
     Args:
-        wish: prompts, durations and path.
+        request: prompts, durations and path.
         config: the program, its model and limits.
         seed: Kimodo's own seed, >= 0.
 
@@ -35,13 +35,13 @@ def generate(wish: Wish, config: KimodoConfig, seed: int) -> Clip:
         AssetError: the program is missing, fails, takes too long, or what it wrote cannot be used.
     """
     program = kimodo_program(config)
-    kept = asset_folder() / "cache" / "kimodo" / _key(wish, config, seed, program)
+    kept = asset_folder() / "cache" / "kimodo" / _key(request, config, seed, program)
     if kept.is_dir():
         with contextlib.suppress(AssetError):
-            return read_result(kept, _STEM, wish)
+            return read_result(kept, _STEM, request)
     with tempfile.TemporaryDirectory(prefix="perpetua_kimodo_") as folder:
-        _run(wish, config, seed, program, Path(folder))
-        clip = read_result(Path(folder), _STEM, wish)
+        _run(request, config, seed, program, Path(folder))
+        clip = read_result(Path(folder), _STEM, request)
         _keep(Path(folder), kept)
     return clip
 
@@ -64,12 +64,12 @@ def kimodo_program(config: KimodoConfig) -> list[str]:
     return [found, *words[1:]]
 
 
-def _key(wish: Wish, config: KimodoConfig, seed: int, program: list[str]) -> str:
+def _key(request: KimodoRequest, config: KimodoConfig, seed: int, program: list[str]) -> str:
     """Everything that the result depends on; a program's own file stands for its version, with what the config says."""
     content = {
-        "prompt": wish.prompt,
-        "durations": wish.durations,
-        "constraints": wish.constraints(),
+        "prompt": request.prompt,
+        "durations": request.durations,
+        "constraints": request.constraints(),
         "model": config.model,
         "seed": seed,
         "transition_frames": TRANSITION_FRAMES,
@@ -79,14 +79,14 @@ def _key(wish: Wish, config: KimodoConfig, seed: int, program: list[str]) -> str
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def _run(wish: Wish, config: KimodoConfig, seed: int, program: list[str], folder: Path) -> None:
+def _run(request: KimodoRequest, config: KimodoConfig, seed: int, program: list[str], folder: Path) -> None:
     constraints = folder / "constraints.json"
-    constraints.write_text(wish.constraints(), encoding="utf-8")
+    constraints.write_text(request.constraints(), encoding="utf-8")
     command = [
         *program,
-        wish.prompt,
+        request.prompt,
         *("--model", config.model),
-        *("--duration", wish.durations),
+        *("--duration", request.durations),
         *("--constraints", str(constraints)),
         *("--output", str(folder / _STEM)),
         *("--num_transition_frames", str(TRANSITION_FRAMES)),
@@ -102,7 +102,7 @@ def _run(wish: Wish, config: KimodoConfig, seed: int, program: list[str], folder
     except subprocess.TimeoutExpired:
         _end(process)
         raise AssetError(
-            f"Kimodo took longer than {config.timeout_s:g} s for {sum(wish.frames)} frames: "
+            f"Kimodo took longer than {config.timeout_s:g} s for {sum(request.frames)} frames: "
             "raise actors.motion.kimodo.timeout_s, or check that it runs on a GPU"
         ) from None
     except BaseException:

@@ -31,8 +31,8 @@ ROWS = "10 20 30 0.5 0.3 0.2 0.1 -0.2 0.3\n12 13 14 0.2 0.3 0.5\n17\n"
 def write_binding(folder: Path, content: str) -> Path:
     place = folder / "clothes" / "thing"
     place.mkdir(parents=True, exist_ok=True)
-    (place / "thing.mhclo").write_text(content)
-    return place / "thing.mhclo"
+    (place / "garment.mhclo").write_text(content)
+    return place / "garment.mhclo"
 
 
 def config_of(folder: Path, count: int) -> ActorsConfig:
@@ -47,16 +47,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_binding_is_read_as_written(tmp_path: Path) -> None:
     path = write_binding(
         tmp_path,
-        "# comment\nbasemesh hm08\nname a thing\ntag Female\nobj_file thing.obj\nmaterial sub/thing.mhmat\n"
+        "# comment\nbasemesh hm08\nname a thing\ntag Female\nobj_file garment.obj\nmaterial sub/garment.mhmat\n"
         f"{scale_lines()}z_depth 41\nmax_pole 8\nverts 0\n{ROWS}\ndelete_verts\n5 7 - 9 19157\n",
     )
     binding = read_binding(path, tmp_path)
     assert binding.base_vertices.tolist() == [[10, 20, 30], [12, 13, 14], [17, 17, 17]]
-    assert np.allclose(binding.shares, [[0.5, 0.3, 0.2], [0.2, 0.3, 0.5], [1.0, 0.0, 0.0]])
+    assert np.allclose(binding.corner_weights, [[0.5, 0.3, 0.2], [0.2, 0.3, 0.5], [1.0, 0.0, 0.0]])
     assert np.allclose(binding.offset_dm, [[0.1, -0.2, 0.3], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     assert np.flatnonzero(binding.hides).tolist() == [5, 7, 8, 9, 19157]
     assert (binding.name, binding.tags, binding.depth) == ("a thing", ("female",), 41)
-    assert binding.mesh_path == path.parent / "thing.obj"
+    assert binding.mesh_path == path.parent / "garment.obj"
     assert binding.scales[1] is not None and binding.scales[1].first == 791
 
 
@@ -95,7 +95,7 @@ def test_broken_bindings_name_file_line_and_rule(tmp_path: Path, content: str, m
     path = write_binding(tmp_path, content)
     with pytest.raises(AssetError, match=message) as caught:
         read_binding(path, tmp_path)
-    assert caught.value.exit_code == 2 and "thing.mhclo" in str(caught.value)
+    assert caught.value.exit_code == 2 and "garment.mhclo" in str(caught.value)
 
 
 def test_links_that_lead_outside_are_refused(tmp_path: Path) -> None:
@@ -285,7 +285,7 @@ def test_a_real_folder_dresses_people() -> None:
     wardrobe = load_wardrobe(Path(SAMPLE))
     body_tree = cKDTree(base_mesh().vertices_m[np.unique(base_mesh().groups["body"].faces)])
     for garment in wardrobe.garments:
-        assert read_mesh(garment.binding.mesh_path).vertex_count == len(garment.binding.shares)
+        assert read_mesh(garment.binding.mesh_path).vertex_count == len(garment.binding.corner_weights)
         away_m, _ = body_tree.query(fitted(garment.binding, base_mesh().vertices_m))
         assert np.median(away_m) < 0.06 and away_m.max() < 0.35, garment.binding.name
     for body in draw_bodies(config_of(Path(SAMPLE), 2), SEED):

@@ -157,8 +157,8 @@ def test_clothes_end_at_straight_lines(folder: Path) -> None:
     bare_m = shaped_m(model, np.zeros(10))
     joint_m = rest_joints_m(model, bare_m)
     surface, lifted_m = cut_parts(model, bare_m, joint_m, Cut(0.4, 0.5))
-    ends_m, share = bare_m[surface.ends], surface.share[:, None].astype(np.float64)
-    place_m = ends_m[:, 0] + share * (ends_m[:, 1] - ends_m[:, 0])
+    ends_m, fraction = bare_m[surface.ends], surface.fraction[:, None].astype(np.float64)
+    place_m = ends_m[:, 0] + fraction * (ends_m[:, 1] - ends_m[:, 0])
     sleeve_y_m = joint_m[16, 1] + 0.4 * (joint_m[20, 1] - joint_m[16, 1])
     top = place_m[np.unique(surface.faces[surface.labels == 5])]
     assert np.abs(top[:, 1]).max() == pytest.approx(sleeve_y_m, abs=2e-3)

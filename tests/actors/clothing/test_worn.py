@@ -34,7 +34,7 @@ def worn(room: int, actor: int) -> tuple[Wearer, Outfit, Dressed]:
     return wearer, person.outfit, dress(wearer, person.outfit, seed)
 
 
-def caught_share(points_m: np.ndarray, outward: np.ndarray, cloth: TriMesh) -> float:
+def caught_fraction(points_m: np.ndarray, outward: np.ndarray, cloth: TriMesh) -> float:
     """Share of points over which, within 12 cm, cloth lies."""
     hits = Caster(cloth).first_hit(points_m, outward)
     return float(np.mean(hits.distance_m < 0.12))
@@ -78,8 +78,8 @@ def test_no_skin_comes_through_cloth(room: int, actor: int, pose: str) -> None:
     inside_m = np.max(fields_m(outfit, base_mesh().vertices_m, weights), axis=0)
     under = shown[inside_m[shown] > RIM_M]
     assert len(under) > 100
-    share = caught_share(body_m[under], normal[under], cloth)
-    assert share > 0.97, f"{1 - share:.1%} of the skin under rims shows in '{pose}'"
+    fraction = caught_fraction(body_m[under], normal[under], cloth)
+    assert fraction > 0.97, f"{1 - fraction:.1%} of the skin under rims shows in '{pose}'"
 
 
 # On a seat the waist lies in a crease, where what is outward is not well defined.
@@ -98,8 +98,8 @@ def test_what_is_worn_under_a_top_stays_under_it(room: int, actor: int, pose: st
     outside = np.sum(out[:, :2] * (bottom.vertices_m[used] - middle_m)[:, :2], axis=1) > 0.0
     waist = used[outside & (bottom.vertices_m[used, 2] > bottom.vertices_m[used, 2].max() - 0.012)]
     outward = vertex_normals(below.vertices_m, below.faces)[waist]
-    share = caught_share(below.vertices_m[waist], outward, posed_cloth(tops, bound, motion))
-    assert share > 0.97, f"{1 - share:.1%} of the waist shows in '{pose}'"
+    fraction = caught_fraction(below.vertices_m[waist], outward, posed_cloth(tops, bound, motion))
+    assert fraction > 0.97, f"{1 - fraction:.1%} of the waist shows in '{pose}'"
 
 
 @pytest.mark.parametrize(("room", "actor"), PEOPLE)

@@ -22,8 +22,8 @@ from perpetua.motion.recorded import archive
 from perpetua.motion.recorded.amass import read_amass
 from perpetua.motion.recorded.bvh import read_bvh_clip
 from perpetua.motion.recorded.clips import clip_listing
+from perpetua.motion.recorded.foot_planting import WantedFoot, plant_foot
 from perpetua.motion.recorded.library import action_words, clip_files, ranked_clips
-from perpetua.motion.recorded.planting import WantedFoot, plant_foot
 from perpetua.motion.rotations import about_y, about_z
 from perpetua.motion.source import MOTION_SOURCES
 from perpetua.scene.actor import BODY_JOINTS, BodyMotion, Route
@@ -169,11 +169,11 @@ def test_a_pause_puts_the_feet_beside_each_other_and_keeps_them_there(tmp_path: 
 
 
 def test_a_running_foot_beyond_the_vertical_keeps_its_yaw_and_stands_still() -> None:
-    share = np.clip((np.arange(90.0) - 20.0) / 50.0, 0.0, 1.0)
-    pitch_rad = 2.0 * np.sin(np.pi * share) ** 2
+    weight = np.clip((np.arange(90.0) - 20.0) / 50.0, 0.0, 1.0)
+    pitch_rad = 2.0 * np.sin(np.pi * weight) ** 2
     rotation = about_z(np.full(90, 0.4)) @ about_y(pitch_rad)
-    ankle_m = np.column_stack([2.0 * share, np.zeros(90), 0.08 + 0.3 * np.sin(np.pi * share) ** 2])
-    stands = (share == 0.0) | (share == 1.0)
+    ankle_m = np.column_stack([2.0 * weight, np.zeros(90), 0.08 + 0.3 * np.sin(np.pi * weight) ** 2])
+    stands = (weight == 0.0) | (weight == 1.0)
     shape = foot_of(SKELETON, "left")
     track = plant_foot(WantedFoot(ankle_m, rotation, rotation, stands, np.ones(90)), shape, np.full(90, 0.25))
     assert np.allclose(track.yaw_rad, 0.4) and track.pitch_rad.max() > 1.95

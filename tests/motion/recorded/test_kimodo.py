@@ -14,7 +14,7 @@ from perpetua.machine.assets import ASSET_FOLDER_VARIABLE
 from perpetua.motion.config import KimodoConfig, MotionConfig
 from perpetua.motion.kinematics import contact_positions, joint_index, joint_positions
 from perpetua.motion.path import RoutePath
-from perpetua.motion.recorded.kimodo_files import make_wish, read_kimodo, read_result
+from perpetua.motion.recorded.kimodo_files import make_request, read_kimodo, read_result
 from perpetua.motion.source import MOTION_SOURCES
 from perpetua.scene.actor import BODY_JOINTS, BodyMotion, Route
 from perpetua.seeding import StageSeed
@@ -73,8 +73,8 @@ def test_the_path_begins_at_the_origin_facing_z_and_every_frame_is_given() -> No
     time_s = np.arange(int(seconds * 24)) / 24.0
     place_m = np.stack([np.where(time_s > 2.0, 2.0 - time_s, 0.0), np.minimum(time_s, 2.0), 0 * time_s], axis=1)
     route = Route(0, place_m + 5.0, np.where(time_s > 2.0, np.pi, 0.5 * np.pi))
-    wish = make_wish("walks", RoutePath(route, 24.0))
-    (path,) = json.loads(wish.constraints())
+    request = make_request("walks", RoutePath(route, 24.0))
+    (path,) = json.loads(request.constraints())
     place, heading = np.array(path["smooth_root_2d"]), np.array(path["global_root_heading"])
     count = int(np.ceil((95 / 24.0 + 1.0) * 30.0)) + 1
     assert path["type"] == "root2d" and path["frame_indices"] == list(range(count))
@@ -88,13 +88,13 @@ def test_the_path_begins_at_the_origin_facing_z_and_every_frame_is_given() -> No
 
 def test_sentences_share_the_time_and_none_lasts_longer_than_ten_seconds() -> None:
     path = RoutePath(sample_route("curve", 24.0, 24.0), 24.0)
-    wish = make_wish("walks 2.5 m. The man looks around", path)
-    assert wish.prompts[0] == "A person walks 2,5 m" and wish.prompts[-1] == "The man looks around"
-    assert wish.prompt.count(".") == len(wish.prompts) == len(wish.frames) == 4
-    assert sum(wish.frames) == len(wish.place_m) and max(wish.frames) < 300
-    assert [int(float(word) * 30.0) for word in wish.durations.split(" ")] == list(wish.frames)
-    assert max(float(word) for word in wish.durations.split(" ")) <= 10.0
-    brief = make_wish("walks. waves. sits. stands", RoutePath(sample_route("curve", 24.0, 0.5), 24.0))
+    request = make_request("walks 2.5 m. The man looks around", path)
+    assert request.prompts[0] == "A person walks 2,5 m" and request.prompts[-1] == "The man looks around"
+    assert request.prompt.count(".") == len(request.prompts) == len(request.frames) == 4
+    assert sum(request.frames) == len(request.place_m) and max(request.frames) < 300
+    assert [int(float(word) * 30.0) for word in request.durations.split(" ")] == list(request.frames)
+    assert max(float(word) for word in request.durations.split(" ")) <= 10.0
+    brief = make_request("walks. waves. sits. stands", RoutePath(sample_route("curve", 24.0, 0.5), 24.0))
     assert brief.prompts == ("A person walks",)
 
 
@@ -189,8 +189,8 @@ def test_a_program_that_is_missing_or_of_another_version_says_so(program: Path, 
 def test_the_robot_is_refused_by_name_and_by_its_joints(program: Path, tmp_path: Path) -> None:
     with pytest.raises(AssetError, match=r"robot.*SOMA"):
         _make(program, _route(), model="Kimodo-G1-RP-v1")
-    wish = make_wish("walks", RoutePath(_route(), FPS))
-    frames = sum(wish.frames)
+    request = make_request("walks", RoutePath(_route(), FPS))
+    frames = sum(request.frames)
     np.savez(
         tmp_path / "g1.npz",
         posed_joints=np.zeros((frames, 34, 3)),
@@ -198,15 +198,15 @@ def test_the_robot_is_refused_by_name_and_by_its_joints(program: Path, tmp_path:
         foot_contacts=np.zeros((frames, 4)),
     )
     with pytest.raises(AssetError, match="G1 robot"):
-        read_kimodo(tmp_path / "g1.npz", wish)
+        read_kimodo(tmp_path / "g1.npz", request)
 
 
 def test_older_files_of_thirty_joints_and_the_amass_export_tell_the_same(tmp_path: Path) -> None:
     route = sample_route("curve", 30.0, 6.0)
     source = MOTION_SOURCES["procedural"]()
     motion = source.make(route, SKELETON, empty_room(), 30.0, MotionConfig(), StageSeed(5, 0, "motion"))
-    wish = replace(
-        make_wish("walks", RoutePath(sample_route("curve", 30.0, 5.0), 30.0)),
+    request = replace(
+        make_request("walks", RoutePath(sample_route("curve", 30.0, 5.0), 30.0)),
         frames=(len(motion.pelvis_m),),
         place_m=np.tile([2.0, 1.0, 0.0], (180, 1)),
         heading_rad=np.full(180, 0.7),
@@ -220,7 +220,7 @@ def test_older_files_of_thirty_joints_and_the_amass_export_tell_the_same(tmp_pat
         global_rot_mats=(y_up @ motion.world_from_joint @ y_up.T)[:, thirty],
         foot_contacts=motion.contacts.astype(float),
     )
-    own = read_kimodo(tmp_path / "old.npz", wish)
+    own = read_kimodo(tmp_path / "old.npz", request)
     turn = np.array([[np.cos(0.7), -np.sin(0.7), 0.0], [np.sin(0.7), np.cos(0.7), 0.0], [0.0, 0.0, 1.0]])
     assert len(BODY_JOINTS) == 22 and np.abs(own.world_from_joint - turn @ motion.world_from_joint).max() < 1e-6
     assert np.allclose(own.pelvis, motion.pelvis_m @ turn.T + [2.0, 1.0, 0.0])
@@ -228,7 +228,7 @@ def test_older_files_of_thirty_joints_and_the_amass_export_tell_the_same(tmp_pat
     facing_y = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     turned = replace(motion, world_from_joint=facing_y @ motion.world_from_joint, pelvis_m=motion.pelvis_m @ facing_y.T)
     write_amass(tmp_path / "other_amass.npz", turned)
-    export = read_result(tmp_path, "other", wish)
+    export = read_result(tmp_path, "other", request)
     assert np.abs(export.world_from_joint - own.world_from_joint).max() < 1e-6
     shift_m = export.pelvis - own.pelvis
     assert np.abs(shift_m - shift_m[0]).max() < 1e-6 and np.linalg.norm(shift_m[0, :2]) < 0.1

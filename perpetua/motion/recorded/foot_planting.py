@@ -6,12 +6,12 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from perpetua.motion.feet import FootShape, FootTrack
-from perpetua.motion.recorded.tape import runs
+from perpetua.motion.recorded.stances import runs
 from perpetua.motion.rotations import about_y, about_z, rotate
 
 # A sole pitched by less than this is flat, in radians.
 _FLAT_RAD = 0.01
-# The foot is flat by this share of a stance, and stays so until that share at least.
+# The foot is flat by this fraction of a stance, and stays so until that fraction at least.
 _LATEST_FLAT, _EARLIEST_RISE = 0.35, 0.4
 # Pitches at which a foot may stand.
 _MOST_LANDING_RAD, _MOST_LEAVING_RAD = 0.5, 1.25
@@ -152,8 +152,8 @@ def _fill_swing(
 ) -> None:
     """The recorded swing, moved so that it leaves from where the foot stood and lands where it will stand."""
     where, count = slice(start, end), end - start
-    share = (np.arange(count) + 1.0) / (count + 1.0)
-    ease = share**2 * (3.0 - 2.0 * share)
+    fraction = (np.arange(count) + 1.0) / (count + 1.0)
+    ease = fraction**2 * (3.0 - 2.0 * fraction)
     before, after = (start - 1 if start > 0 else end), (end if end < len(floor_m) else start - 1)
     inner = 0 <= before < len(floor_m) and 0 <= after < len(floor_m)
     if inner:

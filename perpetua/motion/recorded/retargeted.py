@@ -4,33 +4,27 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
-from scipy.ndimage import gaussian_filter1d
 from scipy.signal import savgol_filter
 
 from perpetua.motion.kinematics import bone, contact_positions, joint_index, joint_positions
 from perpetua.motion.recorded.clip import Clip, mix_rotations, resample_rotations, resample_rows
+from perpetua.motion.recorded.stances import CLIP_HZ, clean_stances, find_stances
 from perpetua.motion.rotations import about_z
 from perpetua.scene.actor import BodyMotion, Skeleton
 
-TAPE_HZ = 60.0
 # A body's path is what is left of its pelvis when the sway of a stride is smoothed away.
 _STRIDE_WINDOW_S = 1.8
 # How fast a turn on the spot counts as going, metres per radian: about what the feet move.
 TURN_RADIUS_M = 0.25
-# A foot stands where one of its sole points is this low and this slow for at least so long.
-_CONTACT_HEIGHT_M = 0.045
-_CONTACT_SPEED_MPS = 0.4
-_LEAST_STANCE_S = 0.12
 # A file that says when feet stand is believed for stances as short as this.
 _LEAST_TOLD_S = 0.05
-_LEAST_SWING_S = 0.1
-# Share of frames in which the lowest sole point is at most as high as the floor.
-_FLOOR_SHARE = 0.3
+# Fraction of frames in which the lowest sole point is at most as high as the floor.
+_FLOOR_FRACTION = 0.3
 
 
 @dataclass(frozen=True)
-class Tape:
-    """Motion relative to a path, ``TAPE_HZ`` rows a second, metres of our body.
+class RetargetedClip:
+    """Motion relative to a path, ``CLIP_HZ`` rows a second, metres of our body.
 
     ``path_from_joint`` are rotations in the frame that goes along the path and faces the heading; ``offset_m`` is the
     pelvis from the path in that frame, its height above the floor; ``velocity_mps`` the path's velocity there;
@@ -54,9 +48,9 @@ class Tape:
         """How fast the path goes, a turn on the spot included."""
         return np.asarray(np.hypot(np.linalg.norm(self.velocity_mps, axis=1), TURN_RADIUS_M * self.turn_rps))
 
-    def rows(self, row: Int64[np.ndarray, " N"]) -> "Tape":
-        """A tape of these rows of this one."""
-        return Tape(
+    def rows(self, row: Int64[np.ndarray, " N"]) -> "RetargetedClip":
+        """A clip of these rows of this one."""
+        return RetargetedClip(
             self.path_m[row],
             self.heading_rad[row],
             self.path_from_joint[row],
@@ -67,35 +61,35 @@ class Tape:
             None if self.finger_from_parent is None else self.finger_from_parent[row],
         )
 
-    def mixed(self, other: "Tape", share: Float64[np.ndarray, " L"]) -> "Tape":
-        """Each row a share of its own of the way to another tape's row."""
-        weight = share[:, None]
+    def mixed(self, other: "RetargetedClip", weight: Float64[np.ndarray, " L"]) -> "RetargetedClip":
+        """Each row a fraction of its own of the way to another clip's row."""
+        column = weight[:, None]
         fingers = self.finger_from_parent
         if fingers is not None and other.finger_from_parent is not None:
-            fingers = mix_rotations(fingers, other.finger_from_parent, share)
-        return Tape(
+            fingers = mix_rotations(fingers, other.finger_from_parent, weight)
+        return RetargetedClip(
             self.path_m,
             self.heading_rad,
-            mix_rotations(self.path_from_joint, other.path_from_joint, share),
-            (1.0 - weight) * self.offset_m + weight * other.offset_m,
-            (1.0 - weight) * self.velocity_mps + weight * other.velocity_mps,
-            (1.0 - share) * self.turn_rps + share * other.turn_rps,
-            np.where(weight < 0.5, self.standing, other.standing),
+            mix_rotations(self.path_from_joint, other.path_from_joint, weight),
+            (1.0 - column) * self.offset_m + column * other.offset_m,
+            (1.0 - column) * self.velocity_mps + column * other.velocity_mps,
+            (1.0 - weight) * self.turn_rps + weight * other.turn_rps,
+            np.where(column < 0.5, self.standing, other.standing),
             fingers,
         )
 
 
-def make_tape(clip: Clip, skeleton: Skeleton) -> Tape:
+def retarget(clip: Clip, skeleton: Skeleton) -> RetargetedClip:
     """A clip at an even rate, scaled to a skeleton's legs, taken apart into path and motion about it."""
-    count = max(2, int(np.floor(clip.seconds * TAPE_HZ)) + 1)
-    row = np.arange(count) * clip.fps / TAPE_HZ
+    count = max(2, int(np.floor(clip.seconds * CLIP_HZ)) + 1)
+    row = np.arange(count) * clip.fps / CLIP_HZ
     rotation = resample_rotations(clip.world_from_joint, row)
     fingers = None if clip.finger_from_parent is None else resample_rotations(clip.finger_from_parent, row)
     pelvis_m = resample_rows(clip.pelvis, row) * _scale(clip, skeleton)
     told = None if clip.standing is None else clip.standing[np.minimum(np.rint(row).astype(int), len(clip.pelvis) - 1)]
     feet_m = _feet_m(rotation, pelvis_m, skeleton)
     lowest_m = feet_m[..., 2].min(axis=1)
-    floor_m = float(np.quantile(lowest_m, _FLOOR_SHARE))
+    floor_m = float(np.quantile(lowest_m, _FLOOR_FRACTION))
     standing = find_stances(feet_m, floor_m) if told is None else clean_stances(told, _LEAST_TOLD_S)
     path_m = _smooth(pelvis_m[:, :2])
     ahead = rotation[:, 0, :, 0]
@@ -104,7 +98,7 @@ def make_tape(clip: Clip, skeleton: Skeleton) -> Tape:
     planar = path_from_world[:, :2, :2]
     velocity_mps = _gradient(path_m)
     offset_m = np.column_stack([_turned(planar, pelvis_m[:, :2] - path_m), pelvis_m[:, 2] - floor_m])
-    return Tape(
+    return RetargetedClip(
         path_m,
         heading_rad,
         path_from_world[:, None] @ rotation,
@@ -129,7 +123,7 @@ def _feet_m(
     rotation: Float64[np.ndarray, "L 22 3 3"], pelvis_m: Float64[np.ndarray, "L 3"], skeleton: Skeleton
 ) -> Float64[np.ndarray, "L 4 3"]:
     still = np.zeros((len(pelvis_m), 4), bool)
-    return contact_positions(BodyMotion(0, TAPE_HZ, rotation, pelvis_m, still), skeleton)
+    return contact_positions(BodyMotion(0, CLIP_HZ, rotation, pelvis_m, still), skeleton)
 
 
 def _turned(planar: Float64[np.ndarray, "L 2 2"], vector: Float64[np.ndarray, "L 2"]) -> Float64[np.ndarray, "L 2"]:
@@ -138,7 +132,7 @@ def _turned(planar: Float64[np.ndarray, "L 2 2"], vector: Float64[np.ndarray, "L
 
 def _smooth(values: Float64[np.ndarray, "L K"]) -> Float64[np.ndarray, "L K"]:
     """A cubic fitted to the window around each row: curves keep their bends, strides lose their sway."""
-    window = min(round(_STRIDE_WINDOW_S * TAPE_HZ), len(values)) | 1
+    window = min(round(_STRIDE_WINDOW_S * CLIP_HZ), len(values)) | 1
     window = window if window <= len(values) else window - 2
     if window < 5:
         return np.asarray(np.tile(values.mean(axis=0), (len(values), 1)))
@@ -146,51 +140,15 @@ def _smooth(values: Float64[np.ndarray, "L K"]) -> Float64[np.ndarray, "L K"]:
 
 
 def _gradient(values: Float64[np.ndarray, "L K"]) -> Float64[np.ndarray, "L K"]:
-    return np.asarray(np.gradient(values, axis=0) * TAPE_HZ)
+    return np.asarray(np.gradient(values, axis=0) * CLIP_HZ)
 
 
-def find_stances(feet_m: Float64[np.ndarray, "L 4 3"], floor_m: float) -> Bool[np.ndarray, "L 2"]:
-    """When each foot stands: heel or toe of its sole low and slow."""
-    speed_mps = np.linalg.norm(np.gradient(feet_m[..., :2], axis=0), axis=2) * TAPE_HZ
-    speed_mps = gaussian_filter1d(speed_mps, 0.02 * TAPE_HZ, axis=0)
-    touches = (feet_m[..., 2] < floor_m + _CONTACT_HEIGHT_M) & (speed_mps < _CONTACT_SPEED_MPS)
-    return clean_stances(np.stack([touches[:, :2].any(axis=1), touches[:, 2:].any(axis=1)], axis=1))
-
-
-def clean_stances(standing: Bool[np.ndarray, "L 2"], shortest_s: float = _LEAST_STANCE_S) -> Bool[np.ndarray, "L 2"]:
-    """Without stances and swings too short to be any, and without short gaps in which neither foot stands."""
-    cleaned = standing.copy()
-    for foot in (0, 1):
-        _flip_short(cleaned[:, foot], False, round(_LEAST_SWING_S * TAPE_HZ))
-        _flip_short(cleaned[:, foot], True, round(shortest_s * TAPE_HZ))
-    neither = ~cleaned.any(axis=1)
-    for start, end in runs(neither):
-        if start > 0 and end < len(neither) and end - start <= round(_LEAST_STANCE_S * TAPE_HZ):
-            middle = (start + end + 1) // 2
-            cleaned[start:middle] |= cleaned[start - 1]
-            cleaned[middle:end] |= cleaned[end]
-    return cleaned
-
-
-def runs(flags: Bool[np.ndarray, " L"]) -> list[tuple[int, int]]:
-    """Stretches of true flags: first row, and the row after the last."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
-
-
-def _flip_short(flags: Bool[np.ndarray, " L"], value: bool, shortest: int) -> None:
-    """Turns runs of ``value`` inside the tape that are shorter than ``shortest`` into their opposite, in place."""
-    for start, end in runs(flags == value):
-        if start > 0 and end < len(flags) and end - start < shortest:
-            flags[start:end] = not value
-
-
-def path_joints_m(tape: Tape, skeleton: Skeleton) -> Float64[np.ndarray, "L 22 3"]:
+def path_joints_m(clip: RetargetedClip, skeleton: Skeleton) -> Float64[np.ndarray, "L 22 3"]:
     """All joints in the frame of the path: what two moments are compared by."""
-    still = np.zeros((len(tape), 4), bool)
-    return joint_positions(BodyMotion(0, TAPE_HZ, tape.path_from_joint, tape.offset_m, still), skeleton)
+    still = np.zeros((len(clip), 4), bool)
+    return joint_positions(BodyMotion(0, CLIP_HZ, clip.path_from_joint, clip.offset_m, still), skeleton)
 
 
-def ankles_m(tape: Tape, skeleton: Skeleton) -> Float64[np.ndarray, "L 2 3"]:
+def ankles_m(clip: RetargetedClip, skeleton: Skeleton) -> Float64[np.ndarray, "L 2 3"]:
     """Left and right ankle in the frame of the path."""
-    return path_joints_m(tape, skeleton)[:, [joint_index("left_ankle"), joint_index("right_ankle")]]
+    return path_joints_m(clip, skeleton)[:, [joint_index("left_ankle"), joint_index("right_ankle")]]

@@ -19,7 +19,7 @@ _LOW_M, _HIGH_M, _AROUND_M = 0.025, 0.6, 0.7
 _FARTHEST_M = 0.14
 _PASSES = 3
 # Shares of a swing in which a foot leaves its line and comes back to it.
-_LEAVE_SHARE = 0.3
+_LEAVE_FRACTION = 0.3
 
 
 def low_obstacles(room: Room, way_m: Float64[np.ndarray, "T 3"]) -> Caster:
@@ -28,10 +28,10 @@ def low_obstacles(room: Room, way_m: Float64[np.ndarray, "T 3"]) -> Caster:
     low = np.append(way_m[:, :2].min(0) - _AROUND_M, floor_m + _LOW_M)
     high = np.append(way_m[:, :2].max(0) + _AROUND_M, floor_m + _HIGH_M)
     kept = [np.zeros((0, 3, 3))]
-    for thing in room.objects:
-        if thing.walkable or len(thing.mesh.faces) == 0:
+    for obj in room.objects:
+        if obj.walkable or len(obj.mesh.faces) == 0:
             continue
-        corners_m = thing.mesh.vertices_m[thing.mesh.faces]
+        corners_m = obj.mesh.vertices_m[obj.mesh.faces]
         kept.append(corners_m[np.all((corners_m.max(1) > low) & (corners_m.min(1) < high), axis=1)])
     soup_m = np.concatenate(kept)
     return Caster(TriMesh(soup_m.reshape(-1, 3), np.arange(3 * len(soup_m), dtype=np.int32).reshape(-1, 3)))
@@ -59,8 +59,8 @@ def _swing_window(swings: Bool[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], swings, [False]]).astype(int)))
     window = np.zeros(len(swings))
     for start, end in edges.reshape(-1, 2):
-        share = (np.arange(start, end) - start + 0.5) / (end - start)
-        window[start:end] = smoothstep(share / _LEAVE_SHARE) * smoothstep((1.0 - share) / _LEAVE_SHARE)
+        fraction = (np.arange(start, end) - start + 0.5) / (end - start)
+        window[start:end] = smoothstep(fraction / _LEAVE_FRACTION) * smoothstep((1.0 - fraction) / _LEAVE_FRACTION)
     return window
 
 

@@ -11,7 +11,7 @@ from perpetua.scene.actor import Skeleton
 
 # Share of the leg by which the pelvis stands lower than with straight legs: at rest, more when walking and running.
 _STANDING_DROP, _WALKING_DROP, _RUNNING_DROP = 0.008, 0.008, 0.075
-# A jogger's hips go up and down by this share of the leg about their mean.
+# A jogger's hips go up and down by this fraction of the leg about their mean.
 _BOUNCE = 0.055
 _FLOOR_SOFTNESS_S = 0.12
 
@@ -35,7 +35,7 @@ def nominal_height_m(
         time_s: evenly spaced times.
     """
     pace = np.clip(path.speed_mps(time_s) / 1.0, 0.0, 1.0)
-    run = path.run_share(time_s)
+    run = path.run_weight(time_s)
     drop_m = (_STANDING_DROP + _WALKING_DROP * pace + _RUNNING_DROP * run + drop) * reach_m
     sole_m = float(skeleton.contact_m[:, 2].min())
     straight_m = float(skeleton.joint_m[joint_index("pelvis"), 2]) - sole_m

@@ -22,7 +22,7 @@ from perpetua.scene.room import Room
 # Half the thickness of an arm at its elbow, wrist and hand, and what it keeps away besides.
 _ELBOW_M, _WRIST_M, _HAND_M, _MARGIN_M = 0.062, 0.05, 0.055, 0.02
 # How far the fingertips are beyond the wrist, lengths of the forearm.
-_HAND_SHARE = 0.72
+_HAND_LENGTH = 0.72
 # Half the thickness of other people around each of their joints' bones; trunks are wider than deep.
 _TRUNK_M, _LIMB_M, _HEAD_M = 0.19, 0.085, 0.13
 # Arms begin to be drawn in so early, and stay in between two narrow places that are this close.
@@ -31,7 +31,7 @@ _AHEAD_S, _BETWEEN_S = 0.45, 0.8
 _FAR_M = 0.12
 # What a surface between the shoulder and the hand counts as, metres.
 _THROUGH_M = 0.3
-_SHARES = (0.4, 0.7, 1.0)
+_WEIGHTS = (0.4, 0.7, 1.0)
 _CHAIN = ("collar", "shoulder", "elbow", "wrist")
 _AT_BELLY = HandPose((0.34, -0.22, -0.60), (-0.5, 0.35, -1.0), (-1.0, -0.3, 0.0))
 _AT_CHEST = HandPose((0.28, -0.24, -0.30), (-0.3, 0.25, -1.0), (-1.0, -0.3, 0.0))
@@ -73,7 +73,7 @@ def clear_arms(motions: tuple[BodyMotion, ...], skeletons: tuple[Skeleton, ...],
 
 
 def _obstacles(room: Room) -> TriMesh:
-    return join([thing.mesh for thing in room.objects if not thing.walkable])
+    return join([obj.mesh for obj in room.objects if not obj.walkable])
 
 
 def _tubes(motion: BodyMotion, skeleton: Skeleton) -> _Tubes:
@@ -87,50 +87,49 @@ def _tubes(motion: BodyMotion, skeleton: Skeleton) -> _Tubes:
     return _Tubes(joint_m[:, parents], joint_m[:, joints], np.array(radius_m))
 
 
-def _clear_arm(motion: BodyMotion, skeleton: Skeleton, side: str, around: _Surroundings) -> BodyMotion:
-    trouble_m = _trouble_m(motion, skeleton, side, around)
-    if not (trouble_m > 0.0).any():
+def _clear_arm(motion: BodyMotion, skeleton: Skeleton, side: str, surroundings: _Surroundings) -> BodyMotion:
+    intrusion_m = _intrusion_m(motion, skeleton, side, surroundings)
+    if not (intrusion_m > 0.0).any():
         return motion
     arm = _relative(motion, side)
     ways = [
-        hanging_arm(side, np.full(len(trouble_m), 0.03), 0.03, np.full(len(trouble_m), 0.12)),
-        *(_held(side, skeleton, pose, len(trouble_m)) for pose in (_AT_BELLY, _AT_CHEST, _BEHIND)),
+        hanging_arm(side, np.full(len(intrusion_m), 0.03), 0.03, np.full(len(intrusion_m), 0.12)),
+        *(_held(side, skeleton, pose, len(intrusion_m)) for pose in (_AT_BELLY, _AT_CHEST, _BEHIND)),
     ]
     drawn_in = [_with_arm(motion, side, way) for way in ways]
-    left_m = np.stack([_trouble_m(other, skeleton, side, around) for other in drawn_in])
-    share = np.zeros((len(ways), len(trouble_m)))
-    for frames in _narrow_places(trouble_m > 0.0, motion.fps):
+    left_m = np.stack([_intrusion_m(other, skeleton, side, surroundings) for other in drawn_in])
+    weight = np.zeros((len(ways), len(intrusion_m)))
+    for frames in _narrow_places(intrusion_m > 0.0, motion.fps):
         way = int(np.maximum(left_m[:, frames], 0.0).max(axis=1).round(3).argmin())
-        if left_m[way, frames].max() < trouble_m[frames].max() - 1e-3:
-            share[way, frames] = 1.0
+        if left_m[way, frames].max() < intrusion_m[frames].max() - 1e-3:
+            weight[way, frames] = 1.0
     window = max(1, round(_AHEAD_S * motion.fps))
     for way, other in enumerate(ways):
-        if share[way].any():
-            wide = maximum_filter1d(share[way], 2 * window + 1, mode="nearest")
+        if weight[way].any():
+            wide = maximum_filter1d(weight[way], 2 * window + 1, mode="nearest")
             soft = np.clip(gaussian_filter1d(wide, 0.45 * window, radius=window, mode="nearest"), 0.0, 1.0)
-            arm = arm.blended(other, _least_share(motion, skeleton, side, around, arm, other, soft))
+            arm = arm.blended(other, _least_weight(motion, skeleton, side, surroundings, arm, other, soft))
     return _with_arm(motion, side, arm)
 
 
-def _least_share(
+def _least_weight(
     motion: BodyMotion,
     skeleton: Skeleton,
     side: str,
-    around: _Surroundings,
+    surroundings: _Surroundings,
     arm: Arm,
     way: Arm,
-    share: Float64[np.ndarray, " T"],
+    weight: Float64[np.ndarray, " T"],
 ) -> Float64[np.ndarray, " T"]:
-    """The smallest of a few parts of a change that serves as well as all of it."""
-    left_m = [
-        float(_trouble_m(_with_arm(motion, side, arm.blended(way, part * share)), skeleton, side, around).max())
-        for part in _SHARES
-    ]
-    best_m = min(left_m)
-    return (
-        next(part for part, trouble_m in zip(_SHARES, left_m, strict=True) if trouble_m <= max(best_m, 0.0) + 1e-3)
-        * share
-    )
+    """The smallest of a few fractions of a change that helps as much as all of it."""
+
+    def left_m(part: float) -> float:
+        moved = _with_arm(motion, side, arm.blended(way, part * weight))
+        return float(_intrusion_m(moved, skeleton, side, surroundings).max())
+
+    intrusions_m = [left_m(part) for part in _WEIGHTS]
+    enough_m = max(min(intrusions_m), 0.0) + 1e-3
+    return next(part for part, left in zip(_WEIGHTS, intrusions_m, strict=True) if left <= enough_m) * weight
 
 
 def _narrow_places(narrow: Bool[np.ndarray, " T"], fps: float) -> list[Int64[np.ndarray, " K"]]:
@@ -159,26 +158,28 @@ def _with_arm(motion: BodyMotion, side: str, arm: Arm) -> BodyMotion:
     return replace(motion, world_from_joint=world)
 
 
-def _trouble_m(motion: BodyMotion, skeleton: Skeleton, side: str, around: _Surroundings) -> Float64[np.ndarray, " T"]:
-    """By how much an arm is too near to anything at each frame; not above 0 where it is clear."""
+def _intrusion_m(
+    motion: BodyMotion, skeleton: Skeleton, side: str, surroundings: _Surroundings
+) -> Float64[np.ndarray, " T"]:
+    """How much an arm is too near to anything at each frame, metres; not above 0 where it is clear."""
     joint_m = joint_positions(motion, skeleton)
     shoulder_m, elbow_m, wrist_m = (
         joint_m[:, joint_index(f"{side}_{name}")] for name in ("shoulder", "elbow", "wrist")
     )
     forearm_m = bone(skeleton, f"{side}_elbow", f"{side}_wrist")
-    tip_m = wrist_m + _HAND_SHARE * motion.world_from_joint[:, joint_index(f"{side}_wrist")] @ forearm_m
+    tip_m = wrist_m + _HAND_LENGTH * motion.world_from_joint[:, joint_index(f"{side}_wrist")] @ forearm_m
     line_m = [0.5 * (shoulder_m + elbow_m), elbow_m, 0.5 * (elbow_m + wrist_m), wrist_m, 0.5 * (wrist_m + tip_m), tip_m]
     radius_m = np.array([_ELBOW_M, _ELBOW_M, _ELBOW_M, _WRIST_M, _HAND_M, 0.4 * _HAND_M])
     points_m = np.stack(line_m, axis=1)
-    away_m = around.scene.closest_distance(points_m.reshape(-1, 3), _FAR_M).reshape(points_m.shape[:2])
-    trouble_m = (radius_m + _MARGIN_M - away_m).max(axis=1)
+    away_m = surroundings.scene.closest_distance(points_m.reshape(-1, 3), _FAR_M).reshape(points_m.shape[:2])
+    intrusion_m = (radius_m + _MARGIN_M - away_m).max(axis=1)
     starts_m = np.stack([shoulder_m, elbow_m, wrist_m], axis=1).reshape(-1, 3)
     ends_m = np.stack([elbow_m, wrist_m, tip_m], axis=1).reshape(-1, 3)
-    through = ~around.scene.clear(starts_m, ends_m).reshape(-1, 3).all(axis=1)
-    trouble_m = np.where(through, np.maximum(trouble_m, _THROUGH_M), trouble_m)
-    for other in around.others:
-        trouble_m = np.maximum(trouble_m, _overlap_m(points_m, radius_m, other))
-    return np.asarray(trouble_m)
+    through = ~surroundings.scene.clear(starts_m, ends_m).reshape(-1, 3).all(axis=1)
+    intrusion_m = np.where(through, np.maximum(intrusion_m, _THROUGH_M), intrusion_m)
+    for other in surroundings.others:
+        intrusion_m = np.maximum(intrusion_m, _overlap_m(points_m, radius_m, other))
+    return np.asarray(intrusion_m)
 
 
 def _overlap_m(
@@ -186,6 +187,6 @@ def _overlap_m(
 ) -> Float64[np.ndarray, " T"]:
     along_m = (tubes.end_m - tubes.start_m)[:, None]
     offset_m = points_m[:, :, None] - tubes.start_m[:, None]
-    share = np.sum(offset_m * along_m, axis=3) / np.maximum(np.sum(along_m**2, axis=3), 1e-12)
-    away_m = np.linalg.norm(offset_m - np.clip(share, 0.0, 1.0)[..., None] * along_m, axis=3)
+    fraction = np.sum(offset_m * along_m, axis=3) / np.maximum(np.sum(along_m**2, axis=3), 1e-12)
+    away_m = np.linalg.norm(offset_m - np.clip(fraction, 0.0, 1.0)[..., None] * along_m, axis=3)
     return np.asarray((radius_m[:, None] + tubes.radius_m + _MARGIN_M - away_m).max(axis=(1, 2)))
