@@ -41,7 +41,7 @@ class Sight:
 
 def scene_mesh(room: Room) -> trimesh.Trimesh:
     """All of a room's triangles."""
-    mesh = join([thing.mesh for thing in room.objects])
+    mesh = join([obj.mesh for obj in room.objects])
     return trimesh.Trimesh(mesh.vertices_m, mesh.faces, process=False)
 
 

@@ -134,12 +134,12 @@ def _cost(profile: cProfile.Profile) -> str:
     spent_s = {code[2]: entry[3] for code, entry in pstats.Stats(profile).stats.items()}  # type: ignore[attr-defined]
     total_s = spent_s["plan_cameras"]
     parts_s = [spent_s[function] for _, function in PARTS]
-    shares = ", ".join(f"{part_s:.1f}" for part_s in [*parts_s, total_s - sum(parts_s)])
-    return f"{total_s:.1f} ({shares})"
+    fractions = ", ".join(f"{part_s:.1f}" for part_s in [*parts_s, total_s - sum(parts_s)])
+    return f"{total_s:.1f} ({fractions})"
 
 
 def _field_error_m(scene: CameraScene) -> float:
-    """Greatest error of the field at random free points, where the scene is the nearest thing: not by open windows."""
+    """Greatest error of the field at random free points, where the scene is the nearest object: not by open windows."""
     field = scene.field
     free_m = voxel_centres_m(field, field.distance_m > field.voxel_m)
     rng = np.random.default_rng(0)
@@ -215,12 +215,12 @@ def _random_paths(scene: CameraScene, draft: Draft, seed: StageSeed) -> tuple[Ca
     """Cameras with the same lenses that drift from one free place to another and look from one point to another."""
     rng = seed.stream("random baseline")
     free_m = voxel_centres_m(scene.field, scene.field.distance_m > 0.25)
-    share = np.linspace(0.0, 1.0, len(scene.times_s))[:, None]
+    fraction = np.linspace(0.0, 1.0, len(scene.times_s))[:, None]
     paths = []
     for wish in draft.wishes:
         ends_m = free_m[rng.integers(len(free_m), size=4)]
-        position_m = (1.0 - share) * ends_m[0] + share * ends_m[1]
-        target_m = (1.0 - share) * ends_m[2] + share * ends_m[3]
+        position_m = (1.0 - fraction) * ends_m[0] + fraction * ends_m[1]
+        target_m = (1.0 - fraction) * ends_m[2] + fraction * ends_m[3]
         lens = Intrinsics.centred(SIZE_PX, SIZE_PX, wish.fov_rad)
         paths.append(CameraPath(wish.camera, look_at(position_m, target_m), lens))
     return tuple(paths)

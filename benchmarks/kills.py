@@ -37,7 +37,7 @@ CONFIG = Path(__file__).parent / "minimal.yaml"
 PUBLISH = "publish"
 MOMENTS = (*STAGE_NAMES, PUBLISH)
 # A kill may come a little later than the stage took undisturbed: while it is hashed and put in place.
-LATEST_SHARE = 1.1
+LATEST_FRACTION = 1.1
 POLL_S = 0.002
 
 
@@ -118,7 +118,7 @@ def _kill_often(
     options: argparse.Namespace, out: Path, room: int, seconds: dict[str, float], rng: np.random.Generator
 ) -> Iterator[Kill]:
     for moment in MOMENTS:
-        after_s = float(rng.uniform(0.0, LATEST_SHARE) * seconds[moment])
+        after_s = float(rng.uniform(0.0, LATEST_FRACTION) * seconds[moment])
         log = _Tail(out / LOG_FILE)
         process = _start(options, out, range(room + 1))
         if _reach(process, log, room, moment):

@@ -7,7 +7,7 @@ import numpy as np
 from perpetua.audit.deep import SceneRays, off_silhouettes, predict_image
 from perpetua.audit.files import SequenceFiles
 
-DEPTH_M, DEPTH_SHARE = 1e-3, 1e-4
+DEPTH_M, DEPTH_FRACTION = 1e-3, 1e-4
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,10 @@ class PixelCount:
     def cells(self) -> list[str]:
         """Agreement of depth off silhouettes, of objects off silhouettes and everywhere, in percent."""
         wrong = ((self.wrong_depth, self.smooth), (self.wrong_smooth_object, self.smooth))
-        shares = [f"{100 * (1 - count / max(of, 1)):.4f}%" for count, of in (*wrong, (self.wrong_object, self.pixels))]
-        return [str(self.pixels), f"{100 * self.smooth / max(self.pixels, 1):.1f}%", *shares]
+        fractions = [
+            f"{100 * (1 - count / max(of, 1)):.4f}%" for count, of in (*wrong, (self.wrong_object, self.pixels))
+        ]
+        return [str(self.pixels), f"{100 * self.smooth / max(self.pixels, 1):.1f}%", *fractions]
 
 
 HEADINGS = ["pixels", "off silhouettes", "depth", "object", "object, all pixels"]
@@ -41,7 +43,7 @@ def count_pixels(
     expected_m, owner = predict_image(files, rays, str(view), frame)
     smooth = off_silhouettes(expected_m, owner)
     rendered_m = np.asarray(files.of_view(view, "depth.npy")[frame], np.float64)
-    far = np.abs(rendered_m - expected_m) > DEPTH_M + DEPTH_SHARE * expected_m
+    far = np.abs(rendered_m - expected_m) > DEPTH_M + DEPTH_FRACTION * expected_m
     other = np.asarray(object_index[view][frame]) != owner
     counts = (smooth, far & smooth, other, other & smooth)
     return PixelCount(owner.size, *(int(np.count_nonzero(which)) for which in counts))

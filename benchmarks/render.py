@@ -145,11 +145,11 @@ def _errors(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
         baked, config = _bake(options, scene)[0], _config(options, 512, 32)
         errors += measure_errors(scene, baked, config, options.crop)
     width_px = options.width or 512
-    share = width_px**2 / BUDGET_PX
+    fraction = width_px**2 / BUDGET_PX
     return [
         f"# Error at equal time against {REFERENCE_SAMPLES} samples, crops of {options.crop} px of {width_px} px",
         "",
-        f"Budgets are for 512 x 512 px; these images get {share:.3f} of them, and one sample at least.",
+        f"Budgets are for 512 x 512 px; these images get {fraction:.3f} of them, and one sample at least.",
         "",
         _row(["room", "way", "budget, CPU s", "samples", "CPU s of an image", "times the budget", "RMSE"]),
         _row(["---"] * 7),
@@ -161,7 +161,7 @@ def _errors(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
                     f"{one.budget_s:g}",
                     str(one.samples),
                     f"{one.cpu_s:.1f}",
-                    f"{one.cpu_s / (share * one.budget_s):.1f}",
+                    f"{one.cpu_s / (fraction * one.budget_s):.1f}",
                     f"{one.rmse:.4f}",
                 ]
             )
@@ -181,7 +181,7 @@ def _memory(options: argparse.Namespace, scenes: list[Scene]) -> list[str]:
             with spent_by_children() as spent:
                 render_views(part.room, part.actors, part.cameras, few, "cpu", scene.folder / "memory", _say_nothing)
             write_json(path, {"mb": spent.peak_mb})
-        triangles = sum(len(thing.mesh.faces) for thing in scene.room.objects)
+        triangles = sum(len(obj.mesh.faces) for obj in scene.room.objects)
         lines.append(_row([scene.name, str(len(scene.room.objects)), str(triangles), f"{read_json(path)['mb']:.0f}"]))
     return lines
 

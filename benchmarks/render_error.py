@@ -89,8 +89,8 @@ def _errors_of_plain(scene: Scene, loop: Loop, config: RenderConfig, border: Bor
         scene, replace(loop, name="error_plain_probe"), [Image(f"{n}", frame, 0, n, around) for n in PROBES], config
     )
     fixed_s, part_s = _line([float(probes.images()[f"{n}"]["cpu_s"]) for n in PROBES])
-    share = (around[2] - around[0]) * (around[3] - around[1]) / (config.width_px * config.height_px)
-    sample_s = part_s / share
+    fraction = (around[2] - around[0]) * (around[3] - around[1]) / (config.width_px * config.height_px)
+    sample_s = part_s / fraction
     budgets_s = [budget_s * config.width_px * config.height_px / BUDGET_PX for budget_s in BUDGETS_S]
     counts = [max(1, int((budget_s - fixed_s) / sample_s)) for budget_s in budgets_s]
     errors = []

@@ -77,15 +77,15 @@ class Scene:
 
 def _scaled(camera: CameraPath, width_px: int) -> CameraPath:
     old = camera.intrinsics
-    share = width_px / old.width_px
+    fraction = width_px / old.width_px
     new = replace(
         old,
-        fx_px=share * old.fx_px,
-        fy_px=share * old.fy_px,
-        cx_px=share * (old.cx_px + 0.5) - 0.5,
-        cy_px=share * (old.cy_px + 0.5) - 0.5,
+        fx_px=fraction * old.fx_px,
+        fy_px=fraction * old.fy_px,
+        cx_px=fraction * (old.cx_px + 0.5) - 0.5,
+        cy_px=fraction * (old.cy_px + 0.5) - 0.5,
         width_px=width_px,
-        height_px=round(share * old.height_px),
+        height_px=round(fraction * old.height_px),
     )
     return replace(camera, intrinsics=new)
 

@@ -92,12 +92,12 @@ def load_scene(work: Path, config: RenderConfig, blend: Path | None, scratch: Pa
 
 def _resized(camera: CameraPath, width_px: int) -> CameraPath:
     old = camera.intrinsics
-    share = width_px / old.width_px
+    fraction = width_px / old.width_px
     middle_px = 0.5 * (width_px - 1)
     new = replace(
         old,
-        fx_px=old.fx_px * share,
-        fy_px=old.fy_px * share,
+        fx_px=old.fx_px * fraction,
+        fy_px=old.fy_px * fraction,
         cx_px=middle_px,
         cy_px=middle_px,
         width_px=width_px,
@@ -249,9 +249,9 @@ def _render(scene: Scene, config: RenderConfig, folder: Path, delays: Iterator[f
     shutil.rmtree(folder, ignore_errors=True)
 
     def on_frame(done: int, total: int, seconds: float) -> None:
-        share = next(delays, None)
-        if share is not None:
-            threading.Timer(share * seconds, _kill_children).start()
+        fraction = next(delays, None)
+        if fraction is not None:
+            threading.Timer(fraction * seconds, _kill_children).start()
 
     unbaked = config.model_copy(update={"bake": False})
     return render_views(scene.room, scene.actors, scene.cameras, unbaked, "cpu", folder, on_frame)

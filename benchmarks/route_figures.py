@@ -103,13 +103,13 @@ class Surroundings:
 
     def __init__(self, room: Room, body: NavigationConfig) -> None:
         self._body = body
-        mesh = join([thing.mesh for thing in room.objects])
+        mesh = join([obj.mesh for obj in room.objects])
         model = fcl.BVHModel()
         model.beginModel(len(mesh.vertices_m), len(mesh.faces))
         model.addSubModel(mesh.vertices_m, mesh.faces.astype(np.int64))
         model.endModel()
         self._scene = fcl.CollisionObject(model)
-        self._floor = _trimesh(join([thing.mesh for thing in room.objects if thing.walkable]))
+        self._floor = _trimesh(join([obj.mesh for obj in room.objects if obj.walkable]))
 
     def hits(self, place_m: Float64[np.ndarray, "N 3"], radius_m: float) -> Bool[np.ndarray, " N"]:
         """Whether an upright cylinder over each place, from step height to head, cuts a triangle."""

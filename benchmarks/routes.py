@@ -145,10 +145,10 @@ def check_table(scenes: list[Scene], frames: int) -> None:
             flush=True,
         )
     spread = np.diff(np.searchsorted(np.sort(np.concatenate(speeds)), [-1.0, *PACE_ENDS_MPS, np.inf]))
-    shares = ", ".join(f"{100 * part / spread.sum():.0f}%" for part in spread)
+    fractions = ", ".join(f"{100 * part / spread.sum():.0f}%" for part in spread)
     print(f"\nViolations: {total}.")
     print(f"Actors that get more than {FAST_M:g} m within {FAST_FRAMES} frames: {np.mean(fast):.0%}.")
-    print(f"Time standing, strolling, walking, brisk, jogging (by speed): {shares}.")
+    print(f"Time standing, strolling, walking, brisk, jogging (by speed): {fractions}.")
     print(f"Highest drift while dwelling: {max(drift):.4f} m/s in {len(drift) - 1} dwells.")
     print(f"Peak memory of this process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB.\n")
 
@@ -241,13 +241,13 @@ def _pause_error(draw: Draw, motion: Motion) -> float:
     return float(error[draw.plan.pausing].mean()) if draw.plan.pausing.any() else 0.0
 
 
-def _scene_share(draw: Draw, motion: Motion) -> float:
+def _scene_fraction(draw: Draw, motion: Motion) -> float:
     return 100.0 * float(draw.around.hits(motion.position_m[:, ::2].reshape(-1, 3), BODY.body_radius_m).mean())
 
 
 # For each loss the figure it serves: lower is better.
 FIGURES: dict[str, tuple[str, Callable[[Draw, Motion], float]]] = {
-    "clearance": ("% of time in furniture", _scene_share),
+    "clearance": ("% of time in furniture", _scene_fraction),
     "separation": (
         "% of time two are too near",
         lambda _, motion: 100.0 * float((motion.least_separation_m < RoutesConfig().separation_m).mean()),

@@ -46,9 +46,9 @@ class Ledger:
         """Entries and those on the image, agreement of a rule over both, and what is wrong."""
         counts = {name: self.counts[rule, group, name] for name in COUNTED}
         wrong = counts["wrongly visible"] + counts["wrongly hidden"]
-        shares = [f"{100 * (1.0 - wrong / max(counts[name], 1)):.3f}%" for name in COUNTED[:2]]
+        fractions = [f"{100 * (1.0 - wrong / max(counts[name], 1)):.3f}%" for name in COUNTED[:2]]
         numbers = [str(count) for count in counts.values()]
-        return [*numbers[:2], *shares, *numbers[2:]]
+        return [*numbers[:2], *fractions, *numbers[2:]]
 
     def in_order(self) -> list[tuple[str, str]]:
         """Rules and kinds that occurred, rule by rule."""

@@ -50,7 +50,7 @@ class Baker:
 
     def bake(self, work: Work) -> tuple[int, int]:
         """Gives one mesh its new material; returns its texels, and how many of its images had to be baked."""
-        mesh = work.thing.data
+        mesh = work.obj.data
         packing = atlas.pack(work.charts, work.texels_per_m)
         layer = mesh.uv_layers.new(name=BAKED_UV, do_init=False)
         layer.uv.foreach_set("vector", atlas.uv(work.charts, packing, work.texels_per_m).ravel())
@@ -82,9 +82,9 @@ class Baker:
         chosen = work.materials
         for material in chosen:
             self._rewire(material)
-        for slot in range(len(work.thing.data.materials)):
+        for slot in range(len(work.obj.data.materials)):
             if slot not in work.slots:
-                work.thing.data.materials[slot] = self._blank
+                work.obj.data.materials[slot] = self._blank
         for channel in channels:
             self._bake_channel(work, channel, chosen, packing)
 
@@ -108,7 +108,7 @@ class Baker:
     ) -> None:
         """One image of one mesh."""
         image = bpy.data.images.new(
-            f"{work.thing.data.name}_{channel}",
+            f"{work.obj.data.name}_{channel}",
             -(-packing.width_px // COARSER[channel]),
             -(-packing.height_px // COARSER[channel]),
             alpha=False,
@@ -182,12 +182,12 @@ def soften(image: bpy.types.Image, work: Work, packing: atlas.Packing) -> None:
     image.update()
 
 
-def isolate(things: list[bpy.types.Object]) -> dict[bpy.types.Object, bool]:
+def isolate(objs: list[bpy.types.Object]) -> dict[bpy.types.Object, bool]:
     """Hides everything from Cycles, so that a bake loads one object; returns what was hidden before."""
-    hidden = {thing: thing.hide_render for thing in things}
-    for thing in things:
-        thing.hide_render = True
-        thing.select_set(False)
+    hidden = {obj: obj.hide_render for obj in objs}
+    for obj in objs:
+        obj.hide_render = True
+        obj.select_set(False)
     return hidden
 
 
@@ -210,17 +210,17 @@ def bake_all(worker: Worker, works: list[Work], files: ImageFiles) -> None:
     for work in works:
         worker.check_parent()
         started = time.monotonic()
-        work.thing.hide_render = False
-        work.thing.select_set(True)
-        bpy.context.view_layer.objects.active = work.thing
+        work.obj.hide_render = False
+        work.obj.select_set(True)
+        bpy.context.view_layer.objects.active = work.obj
         texels, images = baker.bake(work)
-        work.thing.select_set(False)
-        work.thing.hide_render = True
+        work.obj.select_set(False)
+        work.obj.hide_render = True
         seconds = time.monotonic() - started
         charts = len(work.charts.size_m)
-        worker.emit("baked", mesh=work.thing.name, texels=texels, images=images, charts=charts, seconds=seconds)
-    for thing, was_hidden in hidden.items():
-        thing.hide_render = was_hidden
+        worker.emit("baked", mesh=work.obj.name, texels=texels, images=images, charts=charts, seconds=seconds)
+    for obj, was_hidden in hidden.items():
+        obj.hide_render = was_hidden
     scene.world = world
 
 

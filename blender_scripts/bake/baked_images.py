@@ -24,7 +24,7 @@ class ImageFiles:
 
     def name(self, work: Work, channel: str) -> str:
         """The file's name: equal for equal images."""
-        digest = hashlib.sha256(f"{self._content} {work.thing.name} {sorted(work.slots)}".encode())
+        digest = hashlib.sha256(f"{self._content} {work.obj.name} {sorted(work.slots)}".encode())
         for values in (work.texels_per_m, *([work.texels_per_pixel] if channel == NORMAL else [])):
             digest.update(np.ascontiguousarray(values).tobytes())
         return f"{digest.hexdigest()[:24]}_{channel}{SUFFIX.get(channel, '.png')}"

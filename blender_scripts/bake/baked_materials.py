@@ -65,12 +65,12 @@ def _normal(tree: bpy.types.NodeTree, uv: bpy.types.Node, image: bpy.types.Image
 
 
 def _translucent(
-    tree: bpy.types.NodeTree, color: bpy.types.NodeSocket, share: bpy.types.NodeSocket, opaque: bpy.types.NodeSocket
+    tree: bpy.types.NodeTree, color: bpy.types.NodeSocket, fraction: bpy.types.NodeSocket, opaque: bpy.types.NodeSocket
 ) -> bpy.types.NodeSocket:
     translucent = tree.nodes.new("ShaderNodeBsdfTranslucent")
     mix = tree.nodes.new("ShaderNodeMixShader")
     tree.links.new(color, translucent.inputs["Color"])
-    tree.links.new(share, mix.inputs[0])
+    tree.links.new(fraction, mix.inputs[0])
     tree.links.new(opaque, mix.inputs[1])
     tree.links.new(translucent.outputs[0], mix.inputs[2])
     return mix.outputs[0]

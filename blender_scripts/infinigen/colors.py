@@ -22,12 +22,12 @@ MAX_VALUE = 0.86
 LIMIT = "limit_color"
 
 
-def tame_colors(things: list[bpy.types.Object], categories: list[str]) -> None:
+def tame_colors(objs: list[bpy.types.Object], categories: list[str]) -> None:
     """Limits the colours of all materials; one that several kinds of surface share follows the largest."""
     kinds: dict[str, str] = {}
-    by_size = sorted(zip(categories, things, strict=True), key=lambda entry: entry[0] not in CAPS)
-    for category, thing in by_size:
-        for material in thing.data.materials:
+    by_size = sorted(zip(categories, objs, strict=True), key=lambda entry: entry[0] not in CAPS)
+    for category, obj in by_size:
+        for material in obj.data.materials:
             if material is not None and material.use_nodes:
                 kinds.setdefault(material.name, category if category in CAPS else "furniture")
     groups: set[str] = set()

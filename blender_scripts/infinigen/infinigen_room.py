@@ -63,7 +63,7 @@ ROOM_TRIANGLES = 800_000
 class Made:
     """A room between Infinigen and our files: its objects, their categories, its lamps, outline and colliders."""
 
-    things: list[bpy.types.Object]
+    objs: list[bpy.types.Object]
     categories: list[str]
     lamps: list[bpy.types.Object]
     floor_polygon_m: np.ndarray
@@ -83,16 +83,16 @@ def main() -> None:
     if as_made:
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / RAW_FILE), copy=True)
     _make_plain(made)
-    unparent(made.things + made.lamps)
+    unparent(made.objs + made.lamps)
     _move_origin(made, job["dimensions_m"])
     _settle(made)
-    tame_colors(made.things, made.categories)
+    tame_colors(made.objs, made.categories)
     has_windows = "window" in made.categories
     set_light(made.lamps, job["dimensions_m"], job["daytime"], job["lamps_on"], has_windows)
     _tidy(made)
     _write(folder, job, made)
     if as_made:
-        write_as_made(folder, job, made.things, made.categories)
+        write_as_made(folder, job, made.objs, made.categories)
 
 
 def _generate(kind: str, seed: int, dimensions_m: list[float]) -> Made:
@@ -101,10 +101,10 @@ def _generate(kind: str, seed: int, dimensions_m: list[float]) -> Made:
     make_room = getattr(infinigen_rooms, f"room_{kind}_rand")
     result = make_room(np.random.default_rng(seed), dimensions=procfunc.Vector(dimensions_m))
     colliders = joined_colliders(placed_colliders(result.colliders))
-    things, lamps = _keep_only(result)
+    objs, lamps = _keep_only(result)
     return Made(
-        things,
-        [category_of(thing.name) for thing in things],
+        objs,
+        [category_of(obj.name) for obj in objs],
         lamps,
         np.array(shapes.floor_polygon_m),
         np.array(colliders.vertices, np.float64),
@@ -114,27 +114,27 @@ def _generate(kind: str, seed: int, dimensions_m: list[float]) -> Made:
 
 def _keep_only(result: infinigen_rooms.RoomResult) -> tuple[list[bpy.types.Object], list[bpy.types.Object]]:
     """Deletes templates and helpers; returns the room's objects in the order they were made, and its lamps."""
-    things = list({handle.item().name: handle.item() for handle in result.all_objects}.values())
-    kept = {thing.name for thing in things} | {lamp.item().name for lamp in result.lights}
+    objs = list({handle.item().name: handle.item() for handle in result.all_objects}.values())
+    kept = {obj.name for obj in objs} | {lamp.item().name for lamp in result.lights}
     bpy.context.view_layer.update()
-    unparent([thing for thing in bpy.data.objects if thing.name in kept])
-    bpy.data.batch_remove([thing for thing in bpy.data.objects if thing.name not in kept])
-    for thing in things:
-        thing.hide_render = thing.hide_viewport = False
+    unparent([obj for obj in bpy.data.objects if obj.name in kept])
+    bpy.data.batch_remove([obj for obj in bpy.data.objects if obj.name not in kept])
+    for obj in objs:
+        obj.hide_render = obj.hide_viewport = False
     bpy.context.view_layer.update()
     bpy.data.orphans_purge(do_recursive=True)
-    return things, [thing for thing in bpy.data.objects if thing.type == "LIGHT"]
+    return objs, [obj for obj in bpy.data.objects if obj.type == "LIGHT"]
 
 
 def _make_plain(made: Made) -> None:
-    for thing, category in zip(made.things, made.categories, strict=True):
+    for obj, category in zip(made.objs, made.categories, strict=True):
         level = MAX_STRUCTURE_SUBDIVISION if category in STRUCTURE else MAX_SUBDIVISION
-        cap_subdivision(thing, level, _triangle_budget(thing))
-    apply_modifiers(made.things)
+        cap_subdivision(obj, level, _triangle_budget(obj))
+    apply_modifiers(made.objs)
     bpy.data.orphans_purge(do_recursive=True)
-    for thing, category in zip(made.things, made.categories, strict=True):
+    for obj, category in zip(made.objs, made.categories, strict=True):
         if category in GLAZED:
-            cut_panes(thing.data)
+            cut_panes(obj.data)
     _thin(made)
     for material in bpy.data.materials:
         if material.use_nodes:
@@ -142,46 +142,46 @@ def _make_plain(made: Made) -> None:
 
 
 def _thin(made: Made) -> None:
-    budgets = [_triangle_budget(thing) for thing in made.things]
-    wanted = sum(min(budget, triangle_count(thing.data)) for budget, thing in zip(budgets, made.things, strict=True))
-    share = min(1.0, ROOM_TRIANGLES / max(wanted, 1))
+    budgets = [_triangle_budget(obj) for obj in made.objs]
+    wanted = sum(min(budget, triangle_count(obj.data)) for budget, obj in zip(budgets, made.objs, strict=True))
+    fraction = min(1.0, ROOM_TRIANGLES / max(wanted, 1))
     for thin, plants in ((thin_out, False), (thin_leaves, True)):
         some = [k for k, category in enumerate(made.categories) if (category == "plant") == plants]
-        thin([made.things[k] for k in some], [int(share * budgets[k]) for k in some])
+        thin([made.objs[k] for k in some], [int(fraction * budgets[k]) for k in some])
 
 
-def _triangle_budget(thing: bpy.types.Object) -> int:
-    return int(np.clip(TRIANGLES_PER_M * thing.dimensions.length, MIN_TRIANGLES, MAX_TRIANGLES))
+def _triangle_budget(obj: bpy.types.Object) -> int:
+    return int(np.clip(TRIANGLES_PER_M * obj.dimensions.length, MIN_TRIANGLES, MAX_TRIANGLES))
 
 
 def _move_origin(made: Made, dimensions_m: list[float]) -> None:
     """Infinigen's origin is a corner, and its floor lies a little below zero."""
     half_m = np.array([0.5 * dimensions_m[0], 0.5 * dimensions_m[1], 0.0])
     shift = Matrix.Translation(-Vector(half_m))
-    for thing in made.things + made.lamps:
-        thing.matrix_world = shift @ thing.matrix_world
+    for obj in made.objs + made.lamps:
+        obj.matrix_world = shift @ obj.matrix_world
     made.floor_polygon_m -= half_m[:2]
     made.collider_vertices_m -= half_m
     bpy.context.view_layer.update()
-    for thing, category in zip(made.things, made.categories, strict=True):
+    for obj, category in zip(made.objs, made.categories, strict=True):
         if category == "floor":
-            top_m = world_triangles(thing)[0][:, 2].max()
-            thing.matrix_world = Matrix.Translation(Vector((0.0, 0.0, -top_m))) @ thing.matrix_world
+            top_m = world_triangles(obj)[0][:, 2].max()
+            obj.matrix_world = Matrix.Translation(Vector((0.0, 0.0, -top_m))) @ obj.matrix_world
     bpy.context.view_layer.update()
 
 
 def _settle(made: Made) -> None:
-    gone = {thing.name for thing in settle(made.things, made.categories, made.lamps)}
-    kept = [k for k, thing in enumerate(made.things) if thing.name not in gone]
-    left_out = [thing for thing in made.things if thing.name in gone]
-    made.things, made.categories = [made.things[k] for k in kept], [made.categories[k] for k in kept]
+    gone = {obj.name for obj in settle(made.objs, made.categories, made.lamps)}
+    kept = [k for k, obj in enumerate(made.objs) if obj.name not in gone]
+    left_out = [obj for obj in made.objs if obj.name in gone]
+    made.objs, made.categories = [made.objs[k] for k in kept], [made.categories[k] for k in kept]
     bpy.data.batch_remove(left_out)
 
 
 def _tidy(made: Made) -> None:
-    for index, (thing, category) in enumerate(zip(made.things, made.categories, strict=True), start=1):
-        thing.pass_index = index
-        thing.visible_shadow = category not in LAMPS
+    for index, (obj, category) in enumerate(zip(made.objs, made.categories, strict=True), start=1):
+        obj.pass_index = index
+        obj.visible_shadow = category not in LAMPS
     for image in bpy.data.images:
         if image.has_data and image.source in {"FILE", "GENERATED"} and image.packed_file is None:
             image.pack()
@@ -193,14 +193,14 @@ def _write(folder: Path, job: dict, made: Made) -> None:
     numbers = defaultdict(count)
     table = [
         {
-            "object_index": thing.pass_index,
+            "object_index": obj.pass_index,
             # Infinigen's own names ("_table_coffee_legged_rand", "storage_rand.003") say little to a reader.
             "name": f"{category}_{next(numbers[category])}",
             "category": category,
             "walkable": category in WALKABLE,
             "opaque": True,
         }
-        for thing, category in zip(made.things, made.categories, strict=True)
+        for obj, category in zip(made.objs, made.categories, strict=True)
     ]
     room = {
         "kind": job["kind"],
@@ -214,7 +214,7 @@ def _write(folder: Path, job: dict, made: Made) -> None:
 
 def _write_meshes(path: Path, made: Made) -> None:
     """One array of all vertices and one of all triangles; ``*_start`` holds where each object's begin, and the end."""
-    meshes = [world_triangles(thing) for thing in made.things]
+    meshes = [world_triangles(obj) for obj in made.objs]
     np.savez(
         path,
         vertices_m=np.concatenate([vertices_m for vertices_m, _ in meshes]),

@@ -25,7 +25,7 @@ MIN_LAMP_K, MAX_LAMP_K = 2900.0, 5500.0
 # Lamp power per square metre of floor: below the first a room is dim; a ceiling panel then brings it to the second.
 MIN_LAMP_W_M2, PANEL_LAMP_W_M2 = 1.2, 2.2
 # Lamps at full power would outshine the day that comes in at the windows.
-DAY_LAMP_SHARE = 0.35
+DAY_LAMP_FRACTION = 0.35
 # What a room without lamps gets from its open doors and light surfaces, so that a picture shows more than noise.
 FILL_W_M2 = 0.35
 FILL_COLOR: Color = (0.85, 0.92, 1.0)
@@ -55,7 +55,7 @@ def set_light(
     daylight = daytime == "day" and has_windows
     if lamps_on and daylight:
         for lamp in inside:
-            lamp.data.energy *= DAY_LAMP_SHARE
+            lamp.data.energy *= DAY_LAMP_FRACTION
     if lamps_on or (daytime == "day" and not has_windows):
         power_w = sum(lamp.data.energy for lamp in inside)
         least, wanted = (FILL_W_M2, FILL_W_M2) if daylight else (MIN_LAMP_W_M2, PANEL_LAMP_W_M2)
@@ -167,8 +167,8 @@ def _add_panel(power_w: float, color: Color, dimensions_m: list[float]) -> None:
     panel.shape = "RECTANGLE"
     panel.size, panel.size_y = 0.5 * dimensions_m[0], 0.5 * dimensions_m[1]
     panel.energy, panel.color = power_w, color
-    thing = bpy.data.objects.new("ceiling_panel", panel)
-    thing.location = (0.0, 0.0, dimensions_m[2] - 0.1)
+    obj = bpy.data.objects.new("ceiling_panel", panel)
+    obj.location = (0.0, 0.0, dimensions_m[2] - 0.1)
     # It stands for light from nowhere in particular, so it must not mirror in a polished floor.
-    thing.visible_glossy = thing.visible_camera = False
-    bpy.context.scene.collection.objects.link(thing)
+    obj.visible_glossy = obj.visible_camera = False
+    bpy.context.scene.collection.objects.link(obj)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is changed inside Infinigen 2 before it makes a room: its small things, and two costs."""
+"""What is changed inside Infinigen 2 before it makes a room: its small objects, and two costs."""
 
 from collections import OrderedDict
 
@@ -11,7 +11,7 @@ from infinigen2.scenes.placement import collision
 from infinigen2.scenes.room import decoration_objects, room
 from infinigen2.scenes.room.room_shape import RoomShapeResult
 
-from blender_scripts.infinigen.small_objects import small_thing_maker
+from blender_scripts.infinigen.small_objects import small_object_maker
 
 # Placement asks the same furniture again and again before it goes on to other furniture.
 KEPT_SCENES = 3
@@ -31,9 +31,9 @@ class Shapes:
 
 def patch(kind: str) -> Shapes:
     """Changes Infinigen for one room of a kind; the outline of its floor can be read when the room is made."""
-    # Infinigen's rocks need an add-on that can only be had online, and its other small things are abstract solids
+    # Infinigen's rocks need an add-on that can only be had online, and its other small objects are abstract solids
     # or bowls and cups of ten thousand faces, each of which gets a search tree of its own wherever it is placed.
-    make = small_thing_maker(kind)
+    make = small_object_maker(kind)
     boulder.rock_rand = random_primitives.primitive_with_effect_rand = make
     decoration_objects.decoration_smallobj_rand = make
     collision.raycast = _Raycast()
@@ -86,7 +86,7 @@ Placed = tuple[trimesh.Trimesh, np.ndarray]
 def placed_colliders(colliders: collision.CollisionSet) -> list[Placed]:
     """The collision meshes of a set and where they stand (world from mesh, f64[4, 4])."""
     bpy.context.view_layer.update()
-    items = [thing.item() for thing in colliders.objs]
+    items = [obj.item() for obj in colliders.objs]
     meshes = [colliders.mesh_colliders.get(id(item.data)) for item in items]
     placed = [np.asarray(item.matrix_world, np.float64) for item in items]
     return [(mesh, matrix) for mesh, matrix in zip(meshes, placed, strict=True) if mesh is not None]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lets things that hang a little in the air down on what is below them, and leaves out small things that cannot be.
+"""Lets objects that hang a little in the air down on what is below them, and leaves out small objects that cannot be.
 
-Infinigen places things by their unsubdivided meshes, so on a sofa whose seat is rounded in the picture a cushion may
+Infinigen places objects by their unsubdivided meshes, so on a sofa whose seat is rounded in the picture a cushion may
 hang some centimetres above it. Ceiling lamps that touch nothing are lifted, with their light, to the ceiling instead.
 """
 
@@ -29,26 +29,26 @@ _PAST_SURFACE_M = 1e-4
 
 
 def settle(
-    things: list[bpy.types.Object], categories: list[str], lights: list[bpy.types.Object]
+    objs: list[bpy.types.Object], categories: list[str], lights: list[bpy.types.Object]
 ) -> list[bpy.types.Object]:
-    """Moves things down to their supports, the lowest first; returns those that should be left out."""
+    """Moves objects down to their supports, the lowest first; returns those that should be left out."""
     loose = [
-        (world_triangles(thing)[0], thing, category)
-        for thing, category in zip(things, categories, strict=True)
+        (world_triangles(obj)[0], obj, category)
+        for obj, category in zip(objs, categories, strict=True)
         if category in SMALL | STANDING
     ]
     loose = [entry for entry in loose if len(entry[0])]
-    _lift_lamps([thing for thing, category in zip(things, categories, strict=True) if category == CEILING_LAMP], lights)
+    _lift_lamps([obj for obj, category in zip(objs, categories, strict=True) if category == CEILING_LAMP], lights)
     gone = []
-    for vertices_m, thing, category in sorted(loose, key=lambda entry: (entry[0][:, 2].min(), entry[1].name)):
-        gap_m = _gap_m(thing, vertices_m)
+    for vertices_m, obj, category in sorted(loose, key=lambda entry: (entry[0][:, 2].min(), entry[1].name)):
+        gap_m = _gap_m(obj, vertices_m)
         if CLOSE_M < gap_m <= FURTHEST_M:
-            thing.location.z -= gap_m
+            obj.location.z -= gap_m
             bpy.context.view_layer.update()
         elif gap_m > FURTHEST_M and category in SMALL:
-            gone.append(thing)
+            gone.append(obj)
             # Nothing shall settle on it.
-            thing.hide_viewport = True
+            obj.hide_viewport = True
             bpy.context.view_layer.update()
     return gone
 
@@ -62,8 +62,8 @@ def _lift_lamps(lamps: list[bpy.types.Object], lights: list[bpy.types.Object]) -
             low_m, high_m = low_m - LIGHT_REACH_M, high_m + LIGHT_REACH_M
             places_m = [np.array(light.location) for light in lights]
             inside = [bool(((low_m <= place_m) & (place_m <= high_m)).all()) for place_m in places_m]
-            for thing in [lamp, *(light for light, own in zip(lights, inside, strict=True) if own)]:
-                thing.location.z += gap_m
+            for obj in [lamp, *(light for light, own in zip(lights, inside, strict=True) if own)]:
+                obj.location.z += gap_m
     bpy.context.view_layer.update()
 
 
@@ -78,17 +78,17 @@ def _held_aside(lamp: bpy.types.Object, vertices_m: np.ndarray) -> bool:
     return False
 
 
-def _gap_m(thing: bpy.types.Object, vertices_m: np.ndarray, up: bool = False) -> float:
-    """How far the thing would fall (or rise); 0 where something crosses that side of it within reach."""
+def _gap_m(obj: bpy.types.Object, vertices_m: np.ndarray, up: bool = False) -> float:
+    """How far the object would fall (or rise); 0 where something crosses that side of it within reach."""
     mirror = np.array([1.0, 1.0, -1.0 if up else 1.0])
     places_m = _underside_m(vertices_m * mirror) * mirror + _ASIDE_M
     along = Vector((0.0, 0.0, 1.0 if up else -1.0))
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    return min(_way_m(depsgraph, thing, Vector(place_m), along) for place_m in places_m)
+    return min(_way_m(depsgraph, obj, Vector(place_m), along) for place_m in places_m)
 
 
-def _way_m(depsgraph: bpy.types.Depsgraph, thing: bpy.types.Object, place_m: Vector, along: Vector) -> float:
-    # From a little before, so that what the thing is sunk into or exactly rests on is met.
+def _way_m(depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object, place_m: Vector, along: Vector) -> float:
+    # From a little before, so that what the object is sunk into or exactly rests on is met.
     start = place_m - CLOSE_M * along
     travelled_m = 0.0
     for _ in range(MAX_SURFACES):
@@ -96,7 +96,7 @@ def _way_m(depsgraph: bpy.types.Depsgraph, thing: bpy.types.Object, place_m: Vec
         if not hit:
             return float("inf")
         travelled_m += (where - start).length
-        if other.name != thing.name:
+        if other.name != obj.name:
             return max(0.0, travelled_m - CLOSE_M)
         start = where + _PAST_SURFACE_M * along
         travelled_m += _PAST_SURFACE_M

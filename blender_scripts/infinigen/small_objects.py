@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Household things for shelves and tops, in place of the abstract solids that Infinigen puts there.
+"""Household objects for shelves and tops, in place of the abstract solids that Infinigen puts there.
 
 Each maker draws its sizes and colours from the generator it is given and returns a mesh that stands on z = 0, named
-after what it is. Materials are single colours: small things show no more, and they render fast.
+after what it is. Materials are single colours: small objects show no more, and they render fast.
 """
 
 import itertools
@@ -45,27 +45,27 @@ MAX_TRIANGLES = 4_000
 SHARP_ANGLE_RAD = math.radians(35.0)
 
 
-class SmallThing(NamedTuple):
+class SmallObject(NamedTuple):
     """What Infinigen's placement takes."""
 
     mesh: procfunc.MeshObject
 
 
-Maker = Callable[[np.random.Generator], SmallThing]
+Maker = Callable[[np.random.Generator], SmallObject]
 
 
-def small_thing_maker(kind: str) -> Maker:
-    """A maker of things that suit a kind of room, each of a few thousand triangles at most."""
+def small_object_maker(kind: str) -> Maker:
+    """A maker of objects that suit a kind of room, each of a few thousand triangles at most."""
     makers, weights = zip(*_SUITABLE[kind], strict=True)
-    shares = np.array(weights) / sum(weights)
+    fractions = np.array(weights) / sum(weights)
 
-    def make(rng: np.random.Generator, **_: object) -> SmallThing:
-        made = makers[int(rng.choice(len(makers), p=shares))](rng)
-        thing = made.mesh.item()
+    def make(rng: np.random.Generator, **_: object) -> SmallObject:
+        made = makers[int(rng.choice(len(makers), p=fractions))](rng)
+        obj = made.mesh.item()
         # Subdivision would come on top of what is dense already.
-        thing.modifiers.clear()
-        thin = thin_leaves if category_of(thing.name) == "plant" else thin_out
-        thin([thing], [MAX_TRIANGLES])
+        obj.modifiers.clear()
+        thin = thin_leaves if category_of(obj.name) == "plant" else thin_out
+        thin([obj], [MAX_TRIANGLES])
         return made
 
     return make
@@ -119,7 +119,7 @@ class _Builder:
         self._mesh.faces.new(rings[0][::-1]).material_index = slot
         self._mesh.faces.new(rings[-1]).material_index = slot
 
-    def finish(self, name: str) -> SmallThing:
+    def finish(self, name: str) -> SmallObject:
         """The object, linked to the scene."""
         mesh = bpy.data.meshes.new(name)
         self._mesh.to_mesh(mesh)
@@ -128,9 +128,9 @@ class _Builder:
             mesh.materials.append(material)
         mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))
         mesh.set_sharp_from_angle(angle=SHARP_ANGLE_RAD)
-        thing = bpy.data.objects.new(name, mesh)
-        bpy.context.scene.collection.objects.link(thing)
-        return SmallThing(procfunc.MeshObject(thing))
+        obj = bpy.data.objects.new(name, mesh)
+        bpy.context.scene.collection.objects.link(obj)
+        return SmallObject(procfunc.MeshObject(obj))
 
 
 def _any_color(rng: np.random.Generator) -> Color:
@@ -157,7 +157,7 @@ def _draw_book_m(rng: np.random.Generator) -> tuple[float, float, float]:
     return height_m * float(rng.uniform(0.66, 0.78)), height_m, float(rng.uniform(0.015, 0.045))
 
 
-def _book_stack(rng: np.random.Generator) -> SmallThing:
+def _book_stack(rng: np.random.Generator) -> SmallObject:
     builder = _Builder()
     paper = builder.color(PAPER, 0.9)
     z_m = 0.0
@@ -169,7 +169,7 @@ def _book_stack(rng: np.random.Generator) -> SmallThing:
     return builder.finish("book_stack")
 
 
-def _book_row(rng: np.random.Generator) -> SmallThing:
+def _book_row(rng: np.random.Generator) -> SmallObject:
     builder = _Builder()
     paper = builder.color(PAPER, 0.9)
     upright = Matrix(((0, 0, 1, 0), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
@@ -182,7 +182,7 @@ def _book_row(rng: np.random.Generator) -> SmallThing:
     return builder.finish("book_row")
 
 
-def _storage_box(rng: np.random.Generator) -> SmallThing:
+def _storage_box(rng: np.random.Generator) -> SmallObject:
     builder = _Builder()
     x_m, y_m, z_m = (float(side_m) for side_m in rng.uniform((0.12, 0.16, 0.08), (0.22, 0.3, 0.18)))
     color = _any_color(rng)
@@ -193,7 +193,7 @@ def _storage_box(rng: np.random.Generator) -> SmallThing:
     return builder.finish("storage_box")
 
 
-def _jar(rng: np.random.Generator) -> SmallThing:
+def _jar(rng: np.random.Generator) -> SmallObject:
     builder = _Builder()
     radius_m, height_m = float(rng.uniform(0.035, 0.06)), float(rng.uniform(0.08, 0.17))
     body = builder.color(_any_color(rng), float(rng.uniform(0.08, 0.4)))
@@ -208,12 +208,12 @@ def _jar(rng: np.random.Generator) -> SmallThing:
     return builder.finish("jar")
 
 
-def _bottle(rng: np.random.Generator) -> SmallThing:
+def _bottle(rng: np.random.Generator) -> SmallObject:
     builder = _Builder()
     radius_m, height_m = float(rng.uniform(0.028, 0.042)), float(rng.uniform(0.16, 0.3))
     neck_m = float(rng.uniform(0.3, 0.42)) * radius_m
     profile = [(0.92, 0.0), (1.0, 0.02), (1.0, 0.52), (0.95, 0.6), (0.7, 0.68)]
-    outline_m = [(share * radius_m, level * height_m) for share, level in profile]
+    outline_m = [(fraction * radius_m, level * height_m) for fraction, level in profile]
     outline_m += [(neck_m, 0.76 * height_m), (neck_m, 0.93 * height_m)]
     builder.turned(outline_m, builder.color(_any_color(rng), float(rng.uniform(0.05, 0.25))))
     cap = builder.color(COLORS[5] if rng.random() < 0.5 else COLORS[9], 0.4)
@@ -221,7 +221,7 @@ def _bottle(rng: np.random.Generator) -> SmallThing:
     return builder.finish("bottle")
 
 
-def _candle(rng: np.random.Generator) -> SmallThing:
+def _candle(rng: np.random.Generator) -> SmallObject:
     builder = _Builder()
     radius_m, height_m = float(rng.uniform(0.02, 0.04)), float(rng.uniform(0.07, 0.18))
     dish = builder.color(COLORS[9], 0.3, metallic=1.0)
@@ -233,20 +233,20 @@ def _candle(rng: np.random.Generator) -> SmallThing:
     return builder.finish("candle")
 
 
-def _picture_frame(rng: np.random.Generator) -> SmallThing:
+def _picture_frame(rng: np.random.Generator) -> SmallObject:
     builder = _Builder()
     width_m, height_m = float(rng.uniform(0.1, 0.18)), float(rng.uniform(0.13, 0.24))
     lean = Matrix.Translation((0.0, 0.0, 0.004)) @ Matrix.Rotation(float(rng.uniform(0.15, 0.25)), 4, "Y")
     lean = lean @ Matrix.Rotation(math.pi, 4, "Z")
     layers = ((0.0, 1.0, _any_color(rng), 0.4), (0.006, 0.84, PAPER, 0.9), (0.0075, 0.62, _any_color(rng), 0.5))
-    for depth_m, share, color, roughness in layers:
-        lift = Matrix.Translation((-depth_m, 0.0, 0.5 * (1.0 - share) * height_m))
-        size_m = (0.012, share * width_m, share * height_m)
+    for depth_m, fraction, color, roughness in layers:
+        lift = Matrix.Translation((-depth_m, 0.0, 0.5 * (1.0 - fraction) * height_m))
+        size_m = (0.012, fraction * width_m, fraction * height_m)
         builder.box(size_m, lean @ lift, builder.color(color, roughness))
     return builder.finish("picture_frame")
 
 
-def _towels(rng: np.random.Generator) -> SmallThing:
+def _towels(rng: np.random.Generator) -> SmallObject:
     builder = _Builder()
     x_m, y_m = float(rng.uniform(0.18, 0.24)), float(rng.uniform(0.26, 0.34))
     z_m = 0.0

@@ -44,11 +44,11 @@ def _surface(tree: bpy.types.NodeTree, settings: dict, image: np.ndarray | None)
         texture.image = image_from_array(settings["name"], image)
         tree.links.new(texture.outputs["Color"], node.inputs["Base Color"])
     elif settings["pattern"] != "plain":
-        share = PATTERNS[settings["pattern"]](tree, settings["scale_m"])
+        fraction = PATTERNS[settings["pattern"]](tree, settings["scale_m"])
         mix = tree.nodes.new("ShaderNodeMixRGB")
         mix.inputs["Color1"].default_value = (*settings["base_color"], 1.0)
         mix.inputs["Color2"].default_value = (*settings["second_color"], 1.0)
-        tree.links.new(share, mix.inputs["Fac"])
+        tree.links.new(fraction, mix.inputs["Fac"])
         tree.links.new(mix.outputs["Color"], node.inputs["Base Color"])
         node.inputs["Sheen Weight"].default_value = SHEEN.get(settings["pattern"], 0.0)
     return node.outputs["BSDF"]
@@ -104,16 +104,16 @@ def _noise(
 
 def _mix(
     tree: bpy.types.NodeTree,
-    share: bpy.types.NodeSocket | float,
+    fraction: bpy.types.NodeSocket | float,
     first: bpy.types.NodeSocket,
     second: bpy.types.NodeSocket,
 ) -> bpy.types.NodeSocket:
     """``first`` where the share is 0, ``second`` where it is 1; values, not colours."""
     node = tree.nodes.new("ShaderNodeMix")
-    if isinstance(share, float):
-        node.inputs[0].default_value = share
+    if isinstance(fraction, float):
+        node.inputs[0].default_value = fraction
     else:
-        tree.links.new(share, node.inputs[0])
+        tree.links.new(fraction, node.inputs[0])
     tree.links.new(first, node.inputs[2])
     tree.links.new(second, node.inputs[3])
     return node.outputs[0]

@@ -22,7 +22,7 @@ def enable_gpus(preferences: Any, wanted: str, worker: int, workers: int) -> tup
     for backend in GPU_BACKENDS if wanted == "auto" else (wanted.upper(),):
         found = _devices_of(preferences, backend)
         if found:
-            chosen = share_of(range(len(found)), worker, workers)
+            chosen = fraction_of(range(len(found)), worker, workers)
             for device in preferences.devices:
                 device.use = False
             for number in chosen:
@@ -31,7 +31,7 @@ def enable_gpus(preferences: Any, wanted: str, worker: int, workers: int) -> tup
     return None
 
 
-def share_of(numbers: range, worker: int, workers: int) -> list[int]:
+def fraction_of(numbers: range, worker: int, workers: int) -> list[int]:
     """What one worker gets of numbered devices: all different ones while they last, else one that others use too."""
     own = list(numbers[worker::workers])
     return own or [numbers[worker % len(numbers)]]

@@ -74,7 +74,7 @@ def box_projection(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 def add_object(name: str, mesh: bpy.types.Mesh, object_index: int) -> bpy.types.Object:
     """An object in the scene whose object index pass is ``object_index``."""
-    thing = bpy.data.objects.new(name, mesh)
-    thing.pass_index = object_index
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
+    obj = bpy.data.objects.new(name, mesh)
+    obj.pass_index = object_index
+    bpy.context.scene.collection.objects.link(obj)
+    return obj

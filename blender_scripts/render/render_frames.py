@@ -79,7 +79,7 @@ class FrameRenderer:
     """The loaded scene of a job.
 
     Pictures and ground truth come from one render, unless the pictures are blurred or drawn by EEVEE: then a second
-    scene of the same things, with a Cycles of its own that keeps its data, renders the ground truth at one sample.
+    scene of the same objects, with a Cycles of its own that keeps its data, renders the ground truth at one sample.
     """
 
     def __init__(self, worker: Worker, job: dict, folder: Path) -> None:

@@ -36,8 +36,8 @@ def load_room(room: dict, blend_path: str | None, arrays: JobArrays) -> None:
     """Makes the scene hold the room and nothing else."""
     if blend_path is None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
-        for thing in room["objects"]:
-            _add_room_object(thing, arrays)
+        for obj in room["objects"]:
+            _add_room_object(obj, arrays)
         for light in room["lights"]:
             _add_light(light)
         _add_sky(room["sky"] or PLAIN_SKY)
@@ -45,32 +45,32 @@ def load_room(room: dict, blend_path: str | None, arrays: JobArrays) -> None:
         _open_blend(Path(blend_path))
         if bpy.context.scene.world is None:
             _add_sky(PLAIN_SKY)
-    for thing in bpy.context.scene.objects:
-        if thing.type == "LIGHT":
+    for obj in bpy.context.scene.objects:
+        if obj.type == "LIGHT":
             # A lamp that a camera ray meets would be in the picture but not in depth and object index.
-            thing.visible_camera = False
+            obj.visible_camera = False
 
 
 def _open_blend(path: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
-    for camera in [thing for thing in bpy.data.objects if thing.type == "CAMERA"]:
+    for camera in [obj for obj in bpy.data.objects if obj.type == "CAMERA"]:
         bpy.data.objects.remove(camera)
 
 
-def _add_room_object(thing: dict, arrays: JobArrays) -> None:
-    vertices_m, faces = arrays.load(thing["vertices_m"]), arrays.load(thing["faces"])
-    mesh = build_mesh(thing["name"], vertices_m, faces)
+def _add_room_object(obj: dict, arrays: JobArrays) -> None:
+    vertices_m, faces = arrays.load(obj["vertices_m"]), arrays.load(obj["faces"])
+    mesh = build_mesh(obj["name"], vertices_m, faces)
     shade_smooth(mesh, SHARP_ANGLE_RAD)
-    grained = thing["material"]["pattern"] in GRAINED
+    grained = obj["material"]["pattern"] in GRAINED
     set_pattern_uv(mesh, along_the_grain(vertices_m, faces) if grained else box_projection(vertices_m, faces))
-    image = arrays.load_optional(thing["material"]["image"])
+    image = arrays.load_optional(obj["material"]["image"])
     if image is not None:
         # A room object has no UVs of its own: its picture repeats, or covers it once.
-        scale_m = thing["material"]["scale_m"]
+        scale_m = obj["material"]["scale_m"]
         uv = box_projection(vertices_m, faces) / scale_m if scale_m > 0.0 else over_the_whole(vertices_m, faces)
         add_image_uv(mesh, uv)
-    mesh.materials.append(build_material(thing["material"], image))
-    add_object(thing["name"], mesh, thing["object_index"])
+    mesh.materials.append(build_material(obj["material"], image))
+    add_object(obj["name"], mesh, obj["object_index"])
 
 
 def _add_light(settings: dict) -> None:
@@ -79,11 +79,11 @@ def _add_light(settings: dict) -> None:
     lamp.size, lamp.size_y = settings["size_m"]
     lamp.energy = settings["power_w"]
     lamp.color = settings["color"]
-    thing = bpy.data.objects.new("lamp", lamp)
-    thing.location = settings["position_m"]
-    thing.rotation_mode = "QUATERNION"
-    thing.rotation_quaternion = Vector(settings["direction"]).to_track_quat("-Z", "Y")
-    bpy.context.scene.collection.objects.link(thing)
+    obj = bpy.data.objects.new("lamp", lamp)
+    obj.location = settings["position_m"]
+    obj.rotation_mode = "QUATERNION"
+    obj.rotation_quaternion = Vector(settings["direction"]).to_track_quat("-Z", "Y")
+    bpy.context.scene.collection.objects.link(obj)
 
 
 def _add_sky(settings: dict) -> None:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guesses what a thing in a stranger's scene is from the words in its name, its collections' and its materials'."""
+"""Guesses what an object in a stranger's scene is from the words in its name, its collections' and its materials'."""
 
 import re
 from collections.abc import Iterable
 
 from blender_scripts.worker.categories import category_of
 
-# Words that say what a thing is, in the plain nouns of the other sources; of several the longest phrase counts, and of
-# equally long ones the last, because English puts the noun last ("kitchen table", "sofa cushion").
+# Words that say what an object is, in the plain nouns of the other sources; of several the longest phrase counts,
+# and of equally long ones the last, because English puts the noun last ("kitchen table", "sofa cushion").
 _PHRASES: dict[str, str] = {
     phrase: category
     for category, phrases in {
@@ -95,15 +95,15 @@ _PHRASES: dict[str, str] = {
     for phrase in phrases.split(", ")
 }  # fmt: skip
 _LONGEST = max(len(phrase.split()) for phrase in _PHRASES)
-# Materials tell what the building is made of; "wood" or "fabric" on a thing tells nothing.
+# Materials tell what the building is made of; "wood" or "fabric" on an object tells nothing.
 _FROM_MATERIALS = frozenset({"floor", "ceiling", "wall", "rug", "window"})
 
 
 def guess_category(name: str, around: Iterable[str], materials: Iterable[str]) -> str:
-    """The category of a thing; ``clutter`` where nothing is told.
+    """The category of an object; ``clutter`` where nothing is told.
 
     Args:
-        name: the thing's own name.
+        name: the object's own name.
         around: names of its parents and collections, the nearest first.
         materials: names of its materials.
     """

@@ -12,18 +12,18 @@ import numpy as np
 # A face within about 20 degrees of level counts as level.
 MIN_LEVEL_NORMAL = 0.94
 # Faces this near to a height belong to one surface: metres, or a share of the scene where that is less.
-SAME_HEIGHT_M, SAME_HEIGHT_SHARE = 0.025, 0.003
+SAME_HEIGHT_M, SAME_HEIGHT_FRACTION = 0.025, 0.003
 # A floor given by the user is looked for this near to the height given.
 GIVEN_HEIGHT_M = 0.05
 # Floor lies in the lower part of the scene and is no small part of its ground area.
-LOWER_SHARE = 0.4
-MIN_GROUND_SHARE, MIN_FLOOR_M2 = 0.05, 2.0
+LOWER_FRACTION = 0.4
+MIN_GROUND_FRACTION, MIN_FLOOR_M2 = 0.05, 2.0
 # Cells in which the floor's plan is drawn: metres, or a share of the scene where that is less.
-CELL_M, CELL_SHARE, MAX_CELLS = 0.1, 1.0 / 60.0, 500
+CELL_M, CELL_FRACTION, MAX_CELLS = 0.1, 1.0 / 60.0, 500
 SAMPLES_PER_CELL = 6.0
 MAX_SAMPLES = 4_000_000
 # A ceiling is level, covers this share of the floor, and lies above this share of what stands on it.
-CEILING_COVER, CEILING_SHARE = 0.4, 0.3
+CEILING_COVER, CEILING_FRACTION = 0.4, 0.3
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,13 @@ def find_floor(corners_m: np.ndarray, named: np.ndarray, given_z_m: float | None
     if diagonal_m == 0.0:
         return None
     faces = _level_faces(corners_m)
-    least_m2 = min(MIN_FLOOR_M2, MIN_GROUND_SHARE * float(np.prod((high_m - low_m)[:2])))
-    window_m = min(SAME_HEIGHT_M, SAME_HEIGHT_SHARE * diagonal_m)
+    least_m2 = min(MIN_FLOOR_M2, MIN_GROUND_FRACTION * float(np.prod((high_m - low_m)[:2])))
+    window_m = min(SAME_HEIGHT_M, SAME_HEIGHT_FRACTION * diagonal_m)
     if given_z_m is not None:
         window_m = GIVEN_HEIGHT_M
         eligible = np.abs(faces.z_m - given_z_m) <= window_m
     else:
-        eligible = faces.z_m <= low_m[2] + LOWER_SHARE * (high_m[2] - low_m[2]) + window_m
+        eligible = faces.z_m <= low_m[2] + LOWER_FRACTION * (high_m[2] - low_m[2]) + window_m
     for chosen in (named, np.ones_like(named)):
         for upward in (True, False):
             usable = eligible & chosen & faces.level & (faces.upward == upward)
@@ -91,7 +91,7 @@ def find_floor(corners_m: np.ndarray, named: np.ndarray, given_z_m: float | None
 
 
 def ceiling_height_m(corners_m: np.ndarray, floor: Floor) -> tuple[float, bool]:
-    """Height above the floor of the ceiling (True), or where there is none, of the highest thing over it (False)."""
+    """Height above the floor of the ceiling (True), or where there is none, of the highest object over it (False)."""
     middle_m = corners_m.mean(1)
     margin_m = floor.cell_m
     over = ((middle_m[:, :2] >= floor.low_m - margin_m) & (middle_m[:, :2] <= floor.high_m + margin_m)).all(1)
@@ -100,7 +100,7 @@ def ceiling_height_m(corners_m: np.ndarray, floor: Floor) -> tuple[float, bool]:
         return 0.0, False
     top_m = float(corners_m[over, :, 2].max()) - floor.z_m
     faces = _level_faces(corners_m)
-    high = over & faces.level & (faces.z_m - floor.z_m > CEILING_SHARE * top_m)
+    high = over & faces.level & (faces.z_m - floor.z_m > CEILING_FRACTION * top_m)
     # A ceiling looks down, unless its normals are wrong; a large table's top looks up.
     for chosen in (high & ~faces.upward, high):
         height_m = _lowest_cover_m(faces, chosen, floor, 0.01 * top_m)
@@ -151,7 +151,7 @@ def _plan(corners_m: np.ndarray, surface: np.ndarray, area_m2: np.ndarray, upwar
     """The largest connected part of a surface, seen from above."""
     flat_m = corners_m[surface][:, :, :2]
     low_m, high_m = flat_m.min((0, 1)), flat_m.max((0, 1))
-    cell_m = max(min(CELL_M, CELL_SHARE * diagonal_m), float((high_m - low_m).max()) / MAX_CELLS)
+    cell_m = max(min(CELL_M, CELL_FRACTION * diagonal_m), float((high_m - low_m).max()) / MAX_CELLS)
     points_m, owner = _spread(flat_m, area_m2[surface], cell_m)
     shape = np.floor((high_m - low_m) / cell_m).astype(int) + 1
     index = np.minimum(np.floor((points_m - low_m) / cell_m).astype(int), shape - 1)

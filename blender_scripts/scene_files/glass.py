@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Takes the panes that one looks through out of a scene file's things."""
+"""Takes the panes that one looks through out of a scene file's objects."""
 
 import bpy
 
@@ -7,33 +7,33 @@ from blender_scripts.scene_files.mesh_faces import delete_faces
 from blender_scripts.worker.categories import GLAZED
 from blender_scripts.worker.opaque_materials import is_pane, shader_trees
 
-# A thing this thin and this wide is a sheet: a pane if it is of glass.
+# An object this thin and this wide is a sheet: a pane if it is of glass.
 MAX_SHEET_M, MIN_SHEET_SIDE_M = 0.06, 0.3
 # Glass lets more than this through.
 GLASS_TRANSMISSION = 0.5
 
 
-def cut_glass(thing: bpy.types.Object, category: str) -> bool:
-    """Deletes the faces of a thing's panes; True if nothing of it remains.
+def cut_glass(obj: bpy.types.Object, category: str) -> bool:
+    """Deletes the faces of an object's panes; True if nothing of it remains.
 
     Clear surfaces are panes anywhere; glass is one in windows, doors and cabinets, and as a thin sheet.
     """
-    glazed = category in GLAZED or category == "window_frame" or _is_sheet(thing)
+    glazed = category in GLAZED or category == "window_frame" or _is_sheet(obj)
     panes = {
         index
-        for index, material in enumerate(thing.data.materials)
+        for index, material in enumerate(obj.data.materials)
         if is_pane(material) or (glazed and _is_glass(material))
     }
-    faces = thing.data.polygons
+    faces = obj.data.polygons
     gone = {face.index for face in faces if face.material_index in panes}
     if 0 < len(gone) < len(faces):
-        thing.data = thing.data.copy()
-        delete_faces(thing.data, gone.__contains__)
+        obj.data = obj.data.copy()
+        delete_faces(obj.data, gone.__contains__)
     return len(gone) == len(faces)
 
 
-def _is_sheet(thing: bpy.types.Object) -> bool:
-    thin_m, side_m, _ = sorted(thing.dimensions)
+def _is_sheet(obj: bpy.types.Object) -> bool:
+    thin_m, side_m, _ = sorted(obj.dimensions)
     return thin_m <= MAX_SHEET_M and side_m >= MIN_SHEET_SIDE_M
 
 

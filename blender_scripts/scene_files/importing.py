@@ -45,7 +45,7 @@ GREY = (0.4, 0.4, 0.4, 1.0)
 class Piece:
     """One surface of the scene: its object, which has no modifiers, and the names around it, the nearest first."""
 
-    thing: bpy.types.Object
+    obj: bpy.types.Object
     around: list[str]
 
 
@@ -80,10 +80,10 @@ def open_scene(path: Path, suffix: str) -> None:
 
 def _forget_code() -> None:
     """What could run, write or read later: texts, script nodes, compositors, sequencers, animation of shaders."""
-    for thing in bpy.data.objects:
-        for modifier in list(thing.modifiers):
+    for obj in bpy.data.objects:
+        for modifier in list(obj.modifiers):
             if modifier.type in FORBIDDEN_MODIFIERS:
-                thing.modifiers.remove(modifier)
+                obj.modifiers.remove(modifier)
     for scene in bpy.data.scenes:
         scene.animation_data_clear()
         scene.sequence_editor_clear()
@@ -117,20 +117,20 @@ def take_surfaces(metres_per_unit: float, suffix: str, up_axis: str) -> tuple[li
     meshes: dict[tuple, bpy.types.Mesh] = {}
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
-        thing, original = instance.object, instance.object.original
+        obj, original = instance.object, instance.object.original
         if not instance.show_self or original.hide_render:
             continue
         if instance.is_instance and original.type != "MESH":
-            # The mesh that Blender shows for a curve or text, beside the thing itself; converting it crashes.
+            # The mesh that Blender shows for a curve or text, beside the object itself; converting it crashes.
             continue
         matrix = placed @ instance.matrix_world
-        if thing.type == "LIGHT":
+        if obj.type == "LIGHT":
             lamps.append(_new_object(original.name, original.data, matrix))
             lamp_names.append(original.name)
-        elif thing.type in SURFACES:
-            key = _sharing_key(thing, original)
+        elif obj.type in SURFACES:
+            key = _sharing_key(obj, original)
             if key not in meshes:
-                meshes[key] = _plain_mesh(thing, depsgraph)
+                meshes[key] = _plain_mesh(obj, depsgraph)
             if len(meshes[key].polygons):
                 instancer = instance.parent.original if instance.is_instance and instance.parent else None
                 around = _names_around(original, instancer)
@@ -140,33 +140,33 @@ def take_surfaces(metres_per_unit: float, suffix: str, up_axis: str) -> tuple[li
             raise Refused("objects", f"it has more than {MAX_OBJECTS} objects: join small ones, or take instances out")
     if not pieces:
         raise Refused("empty", "it holds nothing that has a surface and is rendered: export meshes")
-    _keep_only([piece.thing for piece in pieces], lamps)
+    _keep_only([piece.obj for piece in pieces], lamps)
     # The file's own objects are gone, and their names free.
-    for thing, name in zip([piece.thing for piece in pieces] + lamps, names + lamp_names, strict=True):
-        thing.name = name
+    for obj, name in zip([piece.obj for piece in pieces] + lamps, names + lamp_names, strict=True):
+        obj.name = name
     _scale_lamps(lamps, metres_per_unit)
     return pieces, lamps
 
 
-def _sharing_key(thing: bpy.types.Object, original: bpy.types.Object) -> tuple:
-    """Equal for things that have the same mesh once evaluated, as far as can be told."""
+def _sharing_key(obj: bpy.types.Object, original: bpy.types.Object) -> tuple:
+    """Equal for objects that have the same mesh once evaluated, as far as can be told."""
     if original.type == "MESH" and not original.modifiers and original.data.shape_keys is None:
         return (
             original.data.name_full,
             *(slot.material.name_full for slot in original.material_slots if slot.material),
         )
-    return ("", original.name_full, 0 if thing.data is None else thing.data.as_pointer())
+    return ("", original.name_full, 0 if obj.data is None else obj.data.as_pointer())
 
 
-def _plain_mesh(thing: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh:
-    mesh = bpy.data.meshes.new_from_object(thing, preserve_all_data_layers=True, depsgraph=depsgraph)
+def _plain_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh:
+    mesh = bpy.data.meshes.new_from_object(obj, preserve_all_data_layers=True, depsgraph=depsgraph)
     places = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", places)
     broken = int((~np.isfinite(places.reshape(-1, 3)).all(1)).sum())
     if broken:
         raise Refused(
             "finite vertices",
-            f"{broken} vertices of '{thing.name}' are no finite numbers: mend or delete them and export it again",
+            f"{broken} vertices of '{obj.name}' are no finite numbers: mend or delete them and export it again",
         )
     mesh.validate()
     return mesh
@@ -190,18 +190,18 @@ def _show_what_is_rendered() -> None:
         layer = waiting.pop()
         layer.hide_viewport = False
         waiting += list(layer.children)
-    for thing in bpy.context.view_layer.objects:
-        thing.hide_viewport = thing.hide_render
-        thing.hide_set(False)
-        if thing.type == "MESH":
-            cap_subdivision(thing, MAX_SUBDIVISION, MAX_SUBDIVIDED_TRIANGLES)
+    for obj in bpy.context.view_layer.objects:
+        obj.hide_viewport = obj.hide_render
+        obj.hide_set(False)
+        if obj.type == "MESH":
+            cap_subdivision(obj, MAX_SUBDIVISION, MAX_SUBDIVIDED_TRIANGLES)
     bpy.context.view_layer.update()
 
 
-def _names_around(thing: bpy.types.Object, instancer: bpy.types.Object | None) -> list[str]:
-    names = [] if thing.data is None else [thing.data.name]
-    for start in filter(None, (thing, instancer)):
-        parent = start.parent if start is thing else start
+def _names_around(obj: bpy.types.Object, instancer: bpy.types.Object | None) -> list[str]:
+    names = [] if obj.data is None else [obj.data.name]
+    for start in filter(None, (obj, instancer)):
+        parent = start.parent if start is obj else start
         while parent is not None:
             names.append(parent.name)
             parent = parent.parent
@@ -210,26 +210,26 @@ def _names_around(thing: bpy.types.Object, instancer: bpy.types.Object | None) -
 
 
 def _new_object(name: str, data: bpy.types.ID, matrix: Matrix) -> bpy.types.Object:
-    thing = bpy.data.objects.new(name, data)
-    thing.matrix_world = matrix
-    whole = np.allclose(np.array(thing.matrix_basis), np.array(matrix), rtol=1e-4, atol=1e-5)
+    obj = bpy.data.objects.new(name, data)
+    obj.matrix_world = matrix
+    whole = np.allclose(np.array(obj.matrix_basis), np.array(matrix), rtol=1e-4, atol=1e-5)
     if isinstance(data, bpy.types.Mesh) and not whole:
         # An object has no shear of its own: it goes into the mesh.
-        thing.data = data.copy()
-        thing.data.transform(matrix)
-        thing.matrix_world = Matrix.Identity(4)
-    return thing
+        obj.data = data.copy()
+        obj.data.transform(matrix)
+        obj.matrix_world = Matrix.Identity(4)
+    return obj
 
 
-def _keep_only(things: list[bpy.types.Object], lamps: list[bpy.types.Object]) -> None:
-    kept = {thing.name_full for thing in things + lamps}
-    bpy.data.batch_remove([thing for thing in bpy.data.objects if thing.name_full not in kept])
+def _keep_only(objs: list[bpy.types.Object], lamps: list[bpy.types.Object]) -> None:
+    kept = {obj.name_full for obj in objs + lamps}
+    bpy.data.batch_remove([obj for obj in bpy.data.objects if obj.name_full not in kept])
     scene = bpy.context.scene
     bpy.data.batch_remove([other for other in bpy.data.scenes if other != scene])
     bpy.data.batch_remove(list(bpy.data.collections))
     scene.camera = None
-    for thing in things + lamps:
-        scene.collection.objects.link(thing)
+    for obj in objs + lamps:
+        scene.collection.objects.link(obj)
     bpy.context.view_layer.update()
 
 

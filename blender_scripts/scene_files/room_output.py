@@ -20,16 +20,16 @@ def add_panel(power_w: float, dimensions_m: list[float]) -> None:
     panel.shape = "RECTANGLE"
     panel.size, panel.size_y = 0.5 * dimensions_m[0], 0.5 * dimensions_m[1]
     panel.energy = power_w
-    thing = bpy.data.objects.new("ceiling_panel", panel)
-    thing.location = (0.0, 0.0, dimensions_m[2] - 0.1)
+    obj = bpy.data.objects.new("ceiling_panel", panel)
+    obj.location = (0.0, 0.0, dimensions_m[2] - 0.1)
     # It stands for light from nowhere in particular, so it must not mirror in a polished floor.
-    thing.visible_glossy = thing.visible_camera = False
-    bpy.context.scene.collection.objects.link(thing)
+    obj.visible_glossy = obj.visible_camera = False
+    bpy.context.scene.collection.objects.link(obj)
 
 
-def write_meshes(path: Path, things: list[bpy.types.Object]) -> None:
+def write_meshes(path: Path, objs: list[bpy.types.Object]) -> None:
     """One array of all vertices and one of all triangles; ``*_start`` holds where each object's begin, and the end."""
-    meshes = [world_triangles(thing) for thing in things]
+    meshes = [world_triangles(obj) for obj in objs]
     np.savez(
         path,
         vertices_m=np.concatenate([vertices_m for vertices_m, _ in meshes]),

@@ -6,7 +6,7 @@ import numpy as np
 from blender_scripts.scene_files.refusal import Refused
 
 # What rooms of people have, metres: least, most, and what is usual.
-# A thing called door may be a handle or a cabinet's, so a small one tells nothing.
+# An object called door may be a handle or a cabinet's, so a small one tells nothing.
 DOOR_M = (0.0, 3.5, 2.05)
 CEILING_M = (1.9, 12.0, 2.6)
 SHORT_SIDE_M = (1.5, 40.0, 5.0)
@@ -22,7 +22,7 @@ def check_scale(sides_m: np.ndarray, height_m: float | None, doors_m: list[float
     Args:
         sides_m: of the floor, along x and y.
         height_m: of the ceiling or walls; None where there are none.
-        doors_m: heights of the things called door.
+        doors_m: heights of the objects called door.
         metres_per_unit: what these measures were made with.
 
     Raises:

@@ -41,7 +41,7 @@ from blender_scripts.worker.plain_meshes import thin_out, world_triangles
 MOST_THINNED = 10
 MIN_TRIANGLES = 200
 # An object is floor as a whole if this share of what it shows upwards is floor, and nothing of it rises above that.
-FLOOR_SHARE, FLOOR_RISE_M = 0.8, 0.1
+FLOOR_FRACTION, FLOOR_RISE_M = 0.8, 0.1
 # A smaller part of another object is left with it.
 MIN_PART_M2 = 0.5
 OPEN_SCENE_HEIGHT_M = 2.5
@@ -65,17 +65,17 @@ def _make(job: dict, worker: Worker) -> None:
     if missing:
         worker.emit("note", text=f"images outside the file's folder or unreadable are grey: {', '.join(missing[:5])}")
     _thin_out(pieces, job["max_triangles"])
-    categories = [guess_category(piece.thing.name, piece.around, _materials(piece.thing)) for piece in pieces]
+    categories = [guess_category(piece.obj.name, piece.around, _materials(piece.obj)) for piece in pieces]
     pieces, categories = _cut_glass(pieces, categories)
-    things = [piece.thing for piece in pieces]
-    corners_m = [vertices_m[faces] for vertices_m, faces in map(world_triangles, things)]
+    objs = [piece.obj for piece in pieces]
+    corners_m = [vertices_m[faces] for vertices_m, faces in map(world_triangles, objs)]
     floor, height_m = _measure(job, corners_m, categories, metres_per_unit)
-    things, categories = _part_floor(things, categories, corners_m, floor)
+    objs, categories = _part_floor(objs, categories, corners_m, floor)
     middle_m = 0.5 * (floor.low_m + floor.high_m)
-    _move(things + lamps, np.append(middle_m, floor.z_m))
+    _move(objs + lamps, np.append(middle_m, floor.z_m))
     _light(lamps, floor, height_m)
-    _tidy(things, categories)
-    _write(job, things, categories, floor, middle_m, height_m)
+    _tidy(objs, categories)
+    _write(job, objs, categories, floor, middle_m, height_m)
 
 
 def _metres_per_unit(job: dict) -> float:
@@ -85,12 +85,12 @@ def _metres_per_unit(job: dict) -> float:
     return units.scale_length if job["suffix"] == "blend" and units.system != "NONE" else 1.0
 
 
-def _materials(thing: bpy.types.Object) -> list[str]:
-    return [material.name for material in thing.data.materials if material is not None]
+def _materials(obj: bpy.types.Object) -> list[str]:
+    return [material.name for material in obj.data.materials if material is not None]
 
 
 def _thin_out(pieces: list[Piece], max_triangles: int) -> None:
-    counts = [sum(len(face.vertices) - 2 for face in piece.thing.data.polygons) for piece in pieces]
+    counts = [sum(len(face.vertices) - 2 for face in piece.obj.data.polygons) for piece in pieces]
     total = sum(counts)
     if total > MOST_THINNED * max_triangles:
         raise Refused(
@@ -99,23 +99,23 @@ def _thin_out(pieces: list[Piece], max_triangles: int) -> None:
             "can be thinned out: simplify it, or raise rooms.max_triangles",
         )
     if total > max_triangles:
-        share = 0.95 * max_triangles / total
-        thin_out([piece.thing for piece in pieces], [max(MIN_TRIANGLES, int(share * count)) for count in counts])
+        fraction = 0.95 * max_triangles / total
+        thin_out([piece.obj for piece in pieces], [max(MIN_TRIANGLES, int(fraction * count)) for count in counts])
 
 
 def _cut_glass(pieces: list[Piece], categories: list[str]) -> tuple[list[Piece], list[str]]:
     """Panes that one looks through are cut out; other glass becomes opaque."""
     kept = []
     for piece, category in zip(pieces, categories, strict=True):
-        if cut_glass(piece.thing, category):
-            bpy.data.objects.remove(piece.thing)
+        if cut_glass(piece.obj, category):
+            bpy.data.objects.remove(piece.obj)
         else:
             kept.append((piece, category))
     for material in bpy.data.materials:
         if material.use_nodes:
             make_opaque(material)
     if not kept:
-        raise Refused("empty", "all that it shows is clear glass: export solid things too")
+        raise Refused("empty", "all that it shows is clear glass: export solid objects too")
     return [piece for piece, _ in kept], [category for _, category in kept]
 
 
@@ -143,12 +143,12 @@ def _measure(
 
 
 def _part_floor(
-    things: list[bpy.types.Object], categories: list[str], corners_m: list[np.ndarray], floor: Floor
+    objs: list[bpy.types.Object], categories: list[str], corners_m: list[np.ndarray], floor: Floor
 ) -> tuple[list[bpy.types.Object], list[str]]:
     """Makes the floor an object, or some, of its own, with faces that look up."""
-    parts, names = list(things), list(categories)
+    parts, names = list(objs), list(categories)
     start = 0
-    for index, (thing, corners) in enumerate(zip(things, corners_m, strict=True)):
+    for index, (obj, corners) in enumerate(zip(objs, corners_m, strict=True)):
         mine = floor.faces[start : start + len(corners)]
         start += len(corners)
         area_m2 = _seen_from_above_m2(corners)
@@ -156,13 +156,13 @@ def _part_floor(
             continue
         facing = area_m2 * (_looks_up(corners) == floor.upward)
         low = corners[:, :, 2].max() <= floor.z_m + FLOOR_RISE_M
-        if categories[index] in WALKABLE or (low and area_m2[mine].sum() >= FLOOR_SHARE * facing.sum()):
+        if categories[index] in WALKABLE or (low and area_m2[mine].sum() >= FLOOR_FRACTION * facing.sum()):
             names[index] = categories[index] if categories[index] in WALKABLE else "floor"
             if mine.any() and not floor.upward:
-                thing.data = thing.data.copy()
-                thing.data.flip_normals()
+                obj.data = obj.data.copy()
+                obj.data.flip_normals()
         elif mine.any():
-            parts.append(_split(thing, mine, flip=not floor.upward))
+            parts.append(_split(obj, mine, flip=not floor.upward))
             names.append("floor")
     return parts, names
 
@@ -177,26 +177,26 @@ def _looks_up(corners_m: np.ndarray) -> np.ndarray:
     return sides[:, 0, 0] * sides[:, 1, 1] > sides[:, 0, 1] * sides[:, 1, 0]
 
 
-def _split(thing: bpy.types.Object, triangles: np.ndarray, flip: bool) -> bpy.types.Object:
+def _split(obj: bpy.types.Object, triangles: np.ndarray, flip: bool) -> bpy.types.Object:
     """Moves the faces behind some of an object's triangles into a new object."""
-    owner = np.empty(len(thing.data.loop_triangles), np.int32)
-    thing.data.loop_triangles.foreach_get("polygon_index", owner)
+    owner = np.empty(len(obj.data.loop_triangles), np.int32)
+    obj.data.loop_triangles.foreach_get("polygon_index", owner)
     chosen = set(owner[triangles].tolist())
-    part = bpy.data.objects.new(f"{thing.name}_floor", thing.data.copy())
-    part.matrix_world = thing.matrix_world
+    part = bpy.data.objects.new(f"{obj.name}_floor", obj.data.copy())
+    part.matrix_world = obj.matrix_world
     bpy.context.scene.collection.objects.link(part)
-    thing.data = thing.data.copy()
-    delete_faces(thing.data, lambda index: index in chosen)
+    obj.data = obj.data.copy()
+    delete_faces(obj.data, lambda index: index in chosen)
     delete_faces(part.data, lambda index: index not in chosen)
     if flip:
         part.data.flip_normals()
     return part
 
 
-def _move(things: list[bpy.types.Object], origin_m: np.ndarray) -> None:
+def _move(objs: list[bpy.types.Object], origin_m: np.ndarray) -> None:
     shift = Matrix.Translation(Vector((-origin_m).tolist()))
-    for thing in things:
-        thing.matrix_world = shift @ thing.matrix_world
+    for obj in objs:
+        obj.matrix_world = shift @ obj.matrix_world
     bpy.context.view_layer.update()
 
 
@@ -213,32 +213,32 @@ def _light(lamps: list[bpy.types.Object], floor: Floor, height_m: float) -> None
         add_panel(PANEL_LAMP_W_M2 * floor.area_m2 - power_w, size_m)
 
 
-def _tidy(things: list[bpy.types.Object], categories: list[str]) -> None:
-    for index, (thing, category) in enumerate(zip(things, categories, strict=True), start=1):
-        thing.pass_index = index
-        thing.visible_shadow = category not in LAMPS
+def _tidy(objs: list[bpy.types.Object], categories: list[str]) -> None:
+    for index, (obj, category) in enumerate(zip(objs, categories, strict=True), start=1):
+        obj.pass_index = index
+        obj.visible_shadow = category not in LAMPS
     bpy.data.orphans_purge(do_recursive=True)
 
 
 def _write(
     job: dict,
-    things: list[bpy.types.Object],
+    objs: list[bpy.types.Object],
     categories: list[str],
     floor: Floor,
     middle_m: np.ndarray,
     height_m: float,
 ) -> None:
     folder = Path(job["folder"])
-    write_meshes(folder / "meshes.npz", things)
+    write_meshes(folder / "meshes.npz", objs)
     table = [
         {
-            "object_index": thing.pass_index,
-            "name": thing.name,
+            "object_index": obj.pass_index,
+            "name": obj.name,
             "category": category,
             "walkable": category in WALKABLE,
             "opaque": True,
         }
-        for thing, category in zip(things, categories, strict=True)
+        for obj, category in zip(objs, categories, strict=True)
     ]
     (low_x, low_y), (high_x, high_y) = floor.low_m - middle_m, floor.high_m - middle_m
     room = {

@@ -69,7 +69,7 @@ _PATTERNS = tuple(
 # A person may stand on the upward faces of these.
 WALKABLE = frozenset({"floor", "rug"})
 
-# Small things: where one hangs in the air it may fall or be left out, and the room stays what it is.
+# Small objects: where one hangs in the air it may fall or be left out, and the room stays what it is.
 SMALL = frozenset(
     {
         "books",

@@ -10,13 +10,13 @@ MAX_SUBDIVISION = 3
 # Flat structure keeps its look with less.
 MAX_STRUCTURE_SUBDIVISION = 2
 # A connected part of a plant with less than this share of its triangles is a leaf, or a bunch of them.
-LEAF_SHARE = 0.03
+LEAF_FRACTION = 0.03
 
 
-def cap_subdivision(thing: bpy.types.Object, max_level: int, max_triangles: int) -> None:
+def cap_subdivision(obj: bpy.types.Object, max_level: int, max_triangles: int) -> None:
     """Lowers subdivision so that the object stays below a number of triangles where its base mesh allows."""
-    faces = max(1, len(thing.data.polygons))
-    for modifier in thing.modifiers:
+    faces = max(1, len(obj.data.polygons))
+    for modifier in obj.modifiers:
         if modifier.type == "SUBSURF":
             level = min(modifier.render_levels, max_level)
             while level > 0 and 2 * faces * 4**level > max_triangles:
@@ -26,33 +26,33 @@ def cap_subdivision(thing: bpy.types.Object, max_level: int, max_triangles: int)
         modifier.show_viewport = modifier.show_render
 
 
-def apply_modifiers(things: list[bpy.types.Object]) -> None:
+def apply_modifiers(objs: list[bpy.types.Object]) -> None:
     """Gives every object the mesh it renders as, without modifiers; equal objects share one mesh."""
-    keys = [_sharing_key(thing) for thing in things]
-    first = dict(zip(reversed(keys), reversed(things), strict=True))
-    for key, thing in zip(keys, things, strict=True):
-        if first[key] is not thing:
+    keys = [_sharing_key(obj) for obj in objs]
+    first = dict(zip(reversed(keys), reversed(objs), strict=True))
+    for key, obj in zip(keys, objs, strict=True):
+        if first[key] is not obj:
             # Evaluating each copy would take memory for all of them at once.
-            thing.modifiers.clear()
+            obj.modifiers.clear()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     meshes = {
         key: bpy.data.meshes.new_from_object(
-            thing.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
+            obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
         )
-        for key, thing in first.items()
+        for key, obj in first.items()
     }
-    for key, thing in zip(keys, things, strict=True):
-        thing.modifiers.clear()
-        thing.data = meshes[key]
+    for key, obj in zip(keys, objs, strict=True):
+        obj.modifiers.clear()
+        obj.data = meshes[key]
 
 
-def _sharing_key(thing: bpy.types.Object) -> tuple:
+def _sharing_key(obj: bpy.types.Object) -> tuple:
     """Equal for objects that evaluate to the same mesh, as far as can be told."""
-    if any(modifier.type != "SUBSURF" for modifier in thing.modifiers):
-        return (thing.name,)
-    materials = tuple(slot.material.name if slot.material is not None else "" for slot in thing.material_slots)
-    levels = tuple(modifier.render_levels for modifier in thing.modifiers)
-    return thing.data.name, materials, levels
+    if any(modifier.type != "SUBSURF" for modifier in obj.modifiers):
+        return (obj.name,)
+    materials = tuple(slot.material.name if slot.material is not None else "" for slot in obj.material_slots)
+    levels = tuple(modifier.render_levels for modifier in obj.modifiers)
+    return obj.data.name, materials, levels
 
 
 def triangle_count(mesh: bpy.types.Mesh) -> int:
@@ -60,41 +60,41 @@ def triangle_count(mesh: bpy.types.Mesh) -> int:
     return len(mesh.loops) - 2 * len(mesh.polygons)
 
 
-def thin_out(things: list[bpy.types.Object], max_triangles: list[int]) -> None:
+def thin_out(objs: list[bpy.types.Object], max_triangles: list[int]) -> None:
     """Collapses edges of meshes that have more triangles than allowed; objects that share a mesh change alike."""
-    for thing, limit in _too_heavy(things, max_triangles):
-        thing.modifiers.new("thin_out", "DECIMATE").ratio = limit / triangle_count(thing.data)
+    for obj, limit in _too_heavy(objs, max_triangles):
+        obj.modifiers.new("thin_out", "DECIMATE").ratio = limit / triangle_count(obj.data)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         mesh = bpy.data.meshes.new_from_object(
-            thing.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
+            obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
         )
-        thing.modifiers.clear()
-        _replace_mesh(thing.data, mesh)
+        obj.modifiers.clear()
+        _replace_mesh(obj.data, mesh)
 
 
-def thin_leaves(things: list[bpy.types.Object], max_triangles: list[int]) -> None:
+def thin_leaves(objs: list[bpy.types.Object], max_triangles: list[int]) -> None:
     """Takes leaves, evenly chosen, from plants that have more triangles than allowed.
 
     A leaf may be a single face, which collapsing edges would take away before anything else.
     """
-    for thing, limit in _too_heavy(things, max_triangles):
+    for obj, limit in _too_heavy(objs, max_triangles):
         editable = bmesh.new()
-        editable.from_mesh(thing.data)
+        editable.from_mesh(obj.data)
         parts = _connected_faces(editable)
-        total = triangle_count(thing.data)
-        leaves = [faces for faces in parts if len(faces) < LEAF_SHARE * len(editable.faces)]
+        total = triangle_count(obj.data)
+        leaves = [faces for faces in parts if len(faces) < LEAF_FRACTION * len(editable.faces)]
         in_leaves = sum(len(face.verts) - 2 for faces in leaves for face in faces)
         kept = min(1.0, max(0.0, (limit - (total - in_leaves)) / max(in_leaves, 1)))
         gone = [faces for k, faces in enumerate(leaves) if int((k + 1) * kept) == int(k * kept)]
         bmesh.ops.delete(editable, geom=[face for faces in gone for face in faces], context="FACES")
-        editable.to_mesh(thing.data)
+        editable.to_mesh(obj.data)
         editable.free()
 
 
-def _too_heavy(things: list[bpy.types.Object], max_triangles: list[int]) -> list[tuple[bpy.types.Object, int]]:
+def _too_heavy(objs: list[bpy.types.Object], max_triangles: list[int]) -> list[tuple[bpy.types.Object, int]]:
     """One object of each mesh that has more triangles than its first user may have, and that number."""
-    first = {thing.data.name: (thing, limit) for thing, limit in zip(things[::-1], max_triangles[::-1], strict=True)}
-    return [(thing, limit) for thing, limit in first.values() if triangle_count(thing.data) > limit]
+    first = {obj.data.name: (obj, limit) for obj, limit in zip(objs[::-1], max_triangles[::-1], strict=True)}
+    return [(obj, limit) for obj, limit in first.values() if triangle_count(obj.data) > limit]
 
 
 def _connected_faces(editable: bmesh.types.BMesh) -> list[list[bmesh.types.BMFace]]:
@@ -120,26 +120,26 @@ def _replace_mesh(old: bpy.types.Mesh, new: bpy.types.Mesh) -> None:
     bpy.data.meshes.remove(old)
 
 
-def unparent(things: list[bpy.types.Object]) -> None:
+def unparent(objs: list[bpy.types.Object]) -> None:
     """Takes objects out of their hierarchy and leaves them where they are."""
-    placed = [(thing, thing.matrix_world.copy()) for thing in things]
-    for thing, _ in placed:
-        thing.parent = None
-        thing.constraints.clear()
-        thing.animation_data_clear()
-    for thing, matrix in placed:
-        thing.matrix_world = matrix
+    placed = [(obj, obj.matrix_world.copy()) for obj in objs]
+    for obj, _ in placed:
+        obj.parent = None
+        obj.constraints.clear()
+        obj.animation_data_clear()
+    for obj, matrix in placed:
+        obj.matrix_world = matrix
 
 
-def world_triangles(thing: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+def world_triangles(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     """World vertices f64[P, 3] in metres and triangles i32[F, 3] as Cycles renders them, outside kept outside."""
-    mesh = thing.data
+    mesh = obj.data
     mesh.calc_loop_triangles()
     local = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", local)
     faces = np.empty(3 * len(mesh.loop_triangles), np.int32)
     mesh.loop_triangles.foreach_get("vertices", faces)
-    matrix = np.array(thing.matrix_world, np.float64)
+    matrix = np.array(obj.matrix_world, np.float64)
     vertices_m = local.reshape(-1, 3).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     faces = faces.reshape(-1, 3)
     if np.linalg.det(matrix[:3, :3]) < 0:

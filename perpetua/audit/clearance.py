@@ -90,9 +90,9 @@ def points_to_moving_mesh_m(
     distance_m = np.full(len(points_m), FAR_M)
     longest_m = _longest_edge_m(vertices_m, faces) if len(near) else 0.0
     for index in near:
-        share = time[index] - frame[index]
+        fraction = time[index] - frame[index]
         before_m, after_m = vertices_m[frame[index] : frame[index] + 2].astype(np.float64)
-        at_time_m = (1.0 - share) * before_m + share * after_m
+        at_time_m = (1.0 - fraction) * before_m + fraction * after_m
         distance_m[index] = _to_triangles_m(points_m[index], at_time_m, faces, longest_m)
     return np.minimum(distance_m, FAR_M)
 

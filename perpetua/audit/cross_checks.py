@@ -14,8 +14,8 @@ from perpetua.audit.visibility_checks import AROUND
 # About so many pixels along each side are looked at in other views.
 LOOKED_AT_PX = 128
 # What labels at the pixel centres around a track may differ from what it does itself.
-MOVES_M, MOVES_SHARE = 0.01, 0.2
-FLOWS_PX, FLOWS_SHARE = 0.5, 0.1
+MOVES_M, MOVES_FRACTION = 0.01, 0.2
+FLOWS_PX, FLOWS_FRACTION = 0.5, 0.1
 TURNED_COSINE = 0.7
 
 
@@ -94,18 +94,18 @@ def _label_agreement(files: SequenceFiles, view: str, frame: int) -> dict[str, B
     if frame + 1 < len(tracks) and f"{view}/scene_flow.npy" in files.arrays:
         own_m = (tracks[frame + 1] - tracks[frame]).astype(np.float64)
         moved = files.arrays[f"{view}/scene_flow.npy"][frame]
-        agreement["scene flow"] = _flows_alike(files, view, frame, moved, own_m, MOVES_M, MOVES_SHARE)
+        agreement["scene flow"] = _flows_alike(files, view, frame, moved, own_m, MOVES_M, MOVES_FRACTION)
     here_px = _pixels(files, view, frame)
     if frame + 1 < len(tracks) and f"{view}/flow.npy" in files.arrays:
         own_px = _pixels(files, view, frame + 1) - here_px
         agreement["flow"] = _flows_alike(
-            files, view, frame, files.arrays[f"{view}/flow.npy"][frame], own_px, FLOWS_PX, FLOWS_SHARE
+            files, view, frame, files.arrays[f"{view}/flow.npy"][frame], own_px, FLOWS_PX, FLOWS_FRACTION
         )
     for other in files.views:
         if f"{view}/flow_to_{other}.npy" in files.arrays:
             flow = files.arrays[f"{view}/flow_to_{other}.npy"][frame]
             own_px = _pixels(files, other, frame) - here_px
-            alike = _flows_alike(files, view, frame, flow, own_px, FLOWS_PX, FLOWS_SHARE)
+            alike = _flows_alike(files, view, frame, flow, own_px, FLOWS_PX, FLOWS_FRACTION)
             agreement["view flow"] = agreement.get("view flow", alike) & alike
     return agreement
 
@@ -117,7 +117,7 @@ def _flows_alike(
     flow: np.ndarray,
     own: Float64[np.ndarray, "P D"],
     constant: float,
-    share: float,
+    fraction: float,
 ) -> Bool[np.ndarray, " P"]:
     """Whether a label around a track is about the track's own vector; true where the track has none."""
     around, on_image = _labels_around(files, view, frame, flow)
@@ -125,7 +125,7 @@ def _flows_alike(
     # Around a point the flow of its surface differs as far as the labels around it differ among themselves.
     spread = np.linalg.norm(around.max(axis=1) - around.min(axis=1), axis=1)
     off = np.linalg.norm(around - own[:, None], axis=2)
-    alike = off <= (constant + share * length + spread)[:, None]
+    alike = off <= (constant + fraction * length + spread)[:, None]
     return np.asarray((alike & on_image).any(axis=1) | ~np.isfinite(own).all(axis=1))
 
 

@@ -21,7 +21,7 @@ from perpetua.audit.tally import Tally, check_of
 
 NOTHING = 0
 # Depth bends by more than this share of itself from pixel to pixel only at silhouettes and creases.
-BEND_SHARE = 0.01
+BEND_FRACTION = 0.01
 # A ray has reached a point this far before it, metres: single precision may pick the next triangle at an edge.
 REACHED_M = 1e-4
 # A pixel shows a track's own surface where what its ray meets is this near to the plane of the track's triangle.
@@ -74,8 +74,8 @@ class SceneRays:
 
     def __init__(self, scene: DeepScene) -> None:
         self.scene = scene
-        things = [thing for thing in scene.room.objects if thing.opaque]
-        self.room = _Part([(thing.object_index, thing.mesh.vertices_m, thing.mesh.faces) for thing in things])
+        objs = [obj for obj in scene.room.objects if obj.opaque]
+        self.room = _Part([(obj.object_index, obj.mesh.vertices_m, obj.mesh.faces) for obj in objs])
         self.people, self.frame = _Part([]), -1
 
     def meet(self, frame: int, origin_m: Float64[np.ndarray, "3"], direction: Float64[np.ndarray, "N 3"]) -> _Met:
@@ -192,7 +192,7 @@ def off_silhouettes(depth_m: Float64[np.ndarray, "H W"], owner: Int64[np.ndarray
     middle = depth_m[1:-1, 1:-1]
     across = np.abs(depth_m[1:-1, 2:] + depth_m[1:-1, :-2] - 2 * middle)
     down = np.abs(depth_m[2:, 1:-1] + depth_m[:-2, 1:-1] - 2 * middle)
-    clear[1:-1, 1:-1] = same & (np.maximum(across, down) <= BEND_SHARE * middle) & (middle > 0)
+    clear[1:-1, 1:-1] = same & (np.maximum(across, down) <= BEND_FRACTION * middle) & (middle > 0)
     return clear
 
 

@@ -67,7 +67,7 @@ class SequenceFiles:
     def actors(self) -> list[int]:
         """Object indices of the record's actors; none where there is no sound record."""
         try:
-            return [int(thing["object_index"]) for thing in (self.record or {})["objects"] if "actor" in thing]
+            return [int(obj["object_index"]) for obj in (self.record or {})["objects"] if "actor" in obj]
         except (KeyError, TypeError, ValueError):
             return []
 

@@ -14,7 +14,7 @@ from perpetua.audit.tally import Tally, check_of, chosen_frames
 LABELLED = 0.99
 UNIT_ERROR = 1e-5
 # Pixels with one normal whose depth says plane lie on one plane, up to this share of the depth.
-FLAT_SHARE = 1e-4
+FLAT_FRACTION = 1e-4
 SAME_NORMAL = 1.0 - 1e-7
 # Of the inverse of depth.
 LINEAR = 2e-5
@@ -22,7 +22,7 @@ LINEAR = 2e-5
 
 def check_object_index(files: SequenceFiles) -> Check:
     """The index names objects of the record, actors just where the mask is, and something just where depth is."""
-    listed = [int(thing["object_index"]) for thing in (files.record or {}).get("objects", [])]
+    listed = [int(obj["object_index"]) for obj in (files.record or {}).get("objects", [])]
     unknown = Tally("is an object that sequence.json does not list", 1.0)
     people = Tally("is an actor or not, and foreground_mask.npy says otherwise", 1.0)
     surface = Tally("is an object or none, and depth.npy says otherwise", 1.0)
@@ -83,4 +83,4 @@ def _rows_off_plane(
         inverse = [1.0 / points_m[..., 2] for points_m in (near, at, far)]
         one &= np.abs(inverse[0] + inverse[2] - 2.0 * inverse[1]) < LINEAR * inverse[1]
         off_m = np.abs(((far - near) * middle).sum(axis=2))
-        yield off_m > FLAT_SHARE * at[..., 2], one
+        yield off_m > FLAT_FRACTION * at[..., 2], one

@@ -26,11 +26,11 @@ from perpetua.scene.room import Room
 SUBSTEPS = 4
 # Rounding of stored positions and of the libraries that measure them.
 SLACK_M = 2e-3
-SLACK_SHARE = 0.01
+SLACK_FRACTION = 0.01
 BODY_POINTS = 24
 # An actor is seen where at least half of its head's and torso's points are.
 UPPER_BODY = (0.5, 1.0)
-SEEN_SHARE = 0.5
+SEEN_FRACTION = 0.5
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def audit_motion(
     """
     positions_m = np.stack([path.world_from_camera[:, :3, 3] for path in cameras])
     axes_m = np.stack([route.position_m for route in routes])
-    sight = Caster(join([thing.mesh for thing in room.objects if thing.opaque]))
+    sight = Caster(join([obj.mesh for obj in room.objects if obj.opaque]))
     seen = np.stack([_seen_by(path, actors, sight) for path in cameras])
     camera_scene_m, camera_actor_m = _camera_distances_m(room, actors, positions_m)
     curves = {
@@ -149,7 +149,7 @@ def _at_least(name: str, who: str, curve_m: Float64[np.ndarray, "_ T"], limit_m:
 def _at_most(name: str, who: str, curve: Float64[np.ndarray, "_ T"], limit: float, unit: str) -> Check:
     index, frame = np.unravel_index(int(curve.argmax()), curve.shape)
     value = float(curve[index, frame])
-    passed = value <= limit * (1.0 + SLACK_SHARE)
+    passed = value <= limit * (1.0 + SLACK_FRACTION)
     most = f"{limit:.4g} {unit}"
     detail = "" if passed else f"{who} {index} has {value:.3f} {unit} at frame {frame}; at most {most} is allowed"
     return Check(name, passed, value, f"<= {most}", detail)
@@ -171,7 +171,7 @@ def _least_per_frame(values: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, "
 def _pillar_distances_m(
     room: Room, axes_m: Float64[np.ndarray, "A T 3"], navigation: NavigationConfig
 ) -> Float64[np.ndarray, "A T"]:
-    obstacles = join([thing.mesh for thing in room.objects if not thing.walkable])
+    obstacles = join([obj.mesh for obj in room.objects if not obj.walkable])
     time = _sub_times(axes_m.shape[1])
     low_m, high_m = navigation.step_m, navigation.body_height_m
     return np.stack(
@@ -192,7 +192,7 @@ def _separation_m(axes_m: Float64[np.ndarray, "A T 3"]) -> Float64[np.ndarray, "
 def _camera_distances_m(
     room: Room, actors: tuple[ActorMesh, ...], positions_m: Float64[np.ndarray, "C T 3"]
 ) -> tuple[Float64[np.ndarray, "C T"], Float64[np.ndarray, "C T"]]:
-    scene = join([thing.mesh for thing in room.objects])
+    scene = join([obj.mesh for obj in room.objects])
     time = _sub_times(positions_m.shape[1])
     points_m = np.concatenate([_between(way_m, time) for way_m in positions_m])
     to_scene_m = points_to_mesh_m(points_m, scene).reshape(len(positions_m), -1)
@@ -230,7 +230,7 @@ def _apart_rad(
 
 def _seen_by(path: CameraPath, actors: tuple[ActorMesh, ...], caster: Caster) -> Bool[np.ndarray, "A T"]:
     """Where a view has half of an actor's head's and torso's points in its image with nothing of the room between."""
-    return np.stack([_seen_share(path, _upper_body_m(actor), caster) >= SEEN_SHARE for actor in actors])
+    return np.stack([_seen_fraction(path, _upper_body_m(actor), caster) >= SEEN_FRACTION for actor in actors])
 
 
 def _upper_body_m(actor: ActorMesh) -> Float64[np.ndarray, "T N 3"]:
@@ -241,7 +241,9 @@ def _upper_body_m(actor: ActorMesh) -> Float64[np.ndarray, "T N 3"]:
     return actor.vertices_m[:, chosen].astype(np.float64)
 
 
-def _seen_share(path: CameraPath, points_m: Float64[np.ndarray, "T N 3"], caster: Caster) -> Float64[np.ndarray, " T"]:
+def _seen_fraction(
+    path: CameraPath, points_m: Float64[np.ndarray, "T N 3"], caster: Caster
+) -> Float64[np.ndarray, " T"]:
     in_camera_m = transform_points(invert_rigid(path.world_from_camera), points_m)
     seen = inside_image(path.intrinsics, project(path.intrinsics, in_camera_m))
     eyes_m = np.broadcast_to(path.world_from_camera[:, None, :3, 3], points_m.shape)

@@ -37,7 +37,7 @@ def _corners(
     scene: DeepScene, frame: int, object_index: Int64[np.ndarray, " P"], face: Int64[np.ndarray, " P"]
 ) -> Float64[np.ndarray, "P 3 3"]:
     """Corners of faces of objects at a frame; NaN for objects and faces that do not exist."""
-    meshes = {thing.object_index: (thing.mesh.vertices_m, thing.mesh.faces) for thing in scene.room.objects}
+    meshes = {obj.object_index: (obj.mesh.vertices_m, obj.mesh.faces) for obj in scene.room.objects}
     meshes |= {actor.object_index: (actor.vertices_m[frame], actor.faces) for actor in scene.actors}
     corner_m = np.full((len(face), 3, 3), np.nan)
     for index in np.unique(object_index).tolist():

@@ -20,7 +20,7 @@ TRACKS = 1024
 FEWEST = 24
 # Another image fits a frame better when its colours are off by less than this share of the own image's, and by at least
 # so much less; colours are natural logarithms.
-BETTER_SHARE, BETTER_BY = 0.55, 0.01
+BETTER_FRACTION, BETTER_BY = 0.55, 0.01
 # Two views' images belong to each other when the colours of common tracks correlate by so much more that way.
 BETTER_CORRELATION = 0.4
 
@@ -46,10 +46,10 @@ def check_pictures(files: SequenceFiles) -> Check:
             best = int(error[:, frame].argmin())
             own, other = float(error[frame, frame]), float(error[best, frame])
             worst = max(worst, 1.0 - other / max(own, 1e-9) if own - other > BETTER_BY else 0.0)
-            if other < BETTER_SHARE * own and own - other > BETTER_BY:
+            if other < BETTER_FRACTION * own and own - other > BETTER_BY:
                 faults.append(f"{view.name}/images_jpeg_bytes.npy[{best}] fits frame {frame} better than its own image")
     faults += _exchanged(files, views)
-    bound = f"no image fits {1.0 - BETTER_SHARE:.0%} better elsewhere"
+    bound = f"no image fits {1.0 - BETTER_FRACTION:.0%} better elsewhere"
     return Check("images of their frames", not faults, worst, bound, "; ".join(faults[:3]))
 
 

@@ -44,11 +44,11 @@ def _unsure_px(intrinsics: Float64[np.ndarray, "4"], seen: Float64[np.ndarray, "
 
 
 def check_poses(files: SequenceFiles, on_actor: Bool[np.ndarray, " P"], bounds: AuditConfig) -> Check:
-    """Poses are rigid, those of things that are no actors constant; each track lies in the box of its object."""
+    """Poses are rigid, those of objects that are no actors constant; each track lies in the box of its object."""
     assert files.record is not None
     poses, boxes = files.arrays["object_poses.npy"], files.arrays["object_boxes.npy"]
     owner = np.asarray(files.record["tracks"]["object_index"], np.int64)
-    listed = np.array([int(thing["object_index"]) for thing in files.record["objects"]], np.int64)
+    listed = np.array([int(obj["object_index"]) for obj in files.record["objects"]], np.int64)
     bound = f"rigid within {bounds.rotation_error:g}, tracks at most {bounds.surface_error_m:g} m out of their boxes"
     if len(listed) != poses.shape[1]:
         detail = f"object_poses.npy has {poses.shape[1]} objects, and {RECORD_FILE} lists {len(listed)}"
@@ -73,11 +73,11 @@ def check_poses(files: SequenceFiles, on_actor: Bool[np.ndarray, " P"], bounds: 
 
 def _pose_faults(poses: np.ndarray, resting: Bool[np.ndarray, " K"], bounds: AuditConfig) -> list[str]:
     faults = []
-    for thing in range(poses.shape[1]):
-        error = rigid_error(poses[:, thing].astype(np.float64))
+    for obj in range(poses.shape[1]):
+        error = rigid_error(poses[:, obj].astype(np.float64))
         frame = int(error.argmax())
         if not error[frame] <= bounds.rotation_error:
-            faults.append(f"object_poses.npy[{frame}, {thing}] is off a rigid transform by {error[frame]:.3g}")
-        elif resting[thing] and (poses[:, thing] != poses[0, thing]).any():
-            faults.append(f"object_poses.npy[:, {thing}] moves, and the object is no actor")
+            faults.append(f"object_poses.npy[{frame}, {obj}] is off a rigid transform by {error[frame]:.3g}")
+        elif resting[obj] and (poses[:, obj] != poses[0, obj]).any():
+            faults.append(f"object_poses.npy[:, {obj}] moves, and the object is no actor")
     return faults

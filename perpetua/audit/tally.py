@@ -54,7 +54,7 @@ class Tally:
             self.first = f"{name}, {place}] {self.words}{more}"
 
     @property
-    def share(self) -> float:
+    def fraction(self) -> float:
         """The share of entries that keep the rule."""
         return 1.0 - self.failed / max(self.tested, 1)
 
@@ -71,4 +71,4 @@ def check_of(name: str, tallies: list[Tally]) -> Check:
     faults = [tally.fault for tally in tallies if tally.fault]
     least = min(tally.least for tally in tallies)
     bound = f">= {least:g} of entries" + (", or all but one" if least < 1.0 else "")
-    return Check(name, not faults, min(tally.share for tally in tallies), bound, "; ".join(faults[:3]))
+    return Check(name, not faults, min(tally.fraction for tally in tallies), bound, "; ".join(faults[:3]))

@@ -58,17 +58,17 @@ def check_query_draw(files: SequenceFiles) -> Check:
     return Check("query draw", not faults, float(len(faults)), bound, _examples(faults))
 
 
-def check_moving_share(files: SequenceFiles, bounds: AuditConfig) -> Check:
+def check_moving_fraction(files: SequenceFiles, bounds: AuditConfig) -> Check:
     """The share of tracks with two positions more than ``moving_m`` apart is about the one that was asked for."""
-    share = float(moves_more_than(files.arrays["tracks_xyz.npy"], bounds.moving_m).mean())
-    wanted = _recorded_moving_share(files, bounds.moving_share)
-    passed = abs(share - wanted) <= bounds.moving_share_slack
+    fraction = float(moves_more_than(files.arrays["tracks_xyz.npy"], bounds.moving_m).mean())
+    wanted = _recorded_moving_fraction(files, bounds.moving_share)
+    passed = abs(fraction - wanted) <= bounds.moving_share_slack
     bound = f"{wanted:g} within {bounds.moving_share_slack:g}"
-    detail = "" if passed else f"tracks_xyz.npy: {share:.1%} of tracks move more than {bounds.moving_m:g} m"
-    return Check("moving tracks", passed, share, bound, detail)
+    detail = "" if passed else f"tracks_xyz.npy: {fraction:.1%} of tracks move more than {bounds.moving_m:g} m"
+    return Check("moving tracks", passed, fraction, bound, detail)
 
 
-def _recorded_moving_share(files: SequenceFiles, otherwise: float) -> float:
+def _recorded_moving_fraction(files: SequenceFiles, otherwise: float) -> float:
     try:
         return float((files.record or {})["config"]["tracks"]["dynamic_share"])
     except (KeyError, TypeError, ValueError):
@@ -87,7 +87,7 @@ def track_table(files: SequenceFiles) -> tuple[dict[str, np.ndarray], str]:
             "face": np.asarray(table["face"], np.int64),
             "barycentric": np.asarray(table["barycentric"], np.float64),
         }
-        actors = [thing["object_index"] for thing in files.record["objects"] if "actor" in thing]
+        actors = [obj["object_index"] for obj in files.record["objects"] if "actor" in obj]
     except (KeyError, TypeError, ValueError) as error:
         return {}, f"{RECORD_FILE} has no sound table of tracks and objects: {error!r}"
     shapes = {"object_index": (count,), "face": (count,), "barycentric": (count, 3)}

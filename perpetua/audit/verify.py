@@ -18,7 +18,7 @@ from perpetua.audit.picture_checks import check_pictures
 from perpetua.audit.pose_checks import check_poses, check_track_pixels
 from perpetua.audit.report import AuditReport, Check
 from perpetua.audit.track_checks import (
-    check_moving_share,
+    check_moving_fraction,
     check_on_surface,
     check_query_draw,
     check_query_pixels,
@@ -124,7 +124,7 @@ def _surface_checks(
     if files.record is None:
         skipped.append(f"moving tracks: there is no {RECORD_FILE} to say how many should")
     else:
-        checks.append(check_moving_share(files, bounds))
+        checks.append(check_moving_fraction(files, bounds))
     if not table:
         skipped.append(f"static tracks, foreground agreement, on surface: {reason}")
     else:

@@ -112,7 +112,7 @@ def _agrees(shown: _Evidence, bounds: AuditConfig, factor: float) -> Bool[np.nda
 
 
 def _near_by(shown: _Evidence) -> Bool[np.ndarray, "P 4"]:
-    """A small or curved thing bends away from the triangle's plane, and still is as near as its pixels are wide."""
+    """A small or curved object bends away from the triangle's plane, and still is as near as its pixels are wide."""
     return np.asarray(
         shown.inside[:, None] & shown.on_image & (np.abs(shown.rendered_m - shown.depth_m[:, None]) <= shown.width_m)
     )

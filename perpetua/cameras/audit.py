@@ -32,15 +32,15 @@ class Violation:
 class CameraAudit:
     """Figures of C views and A actors, and what breaks a rule.
 
-    ``focus_share`` is the share of frames in which a view sees one of its focus actors, ``covered_share`` that in
+    ``focus_fraction`` is the share of frames in which a view sees one of its focus actors, ``covered_fraction`` that in
     which enough views see an actor, ``apart_deg`` the mean angle between the two most different views that see it.
     """
 
     scene_distance_m: Float64[np.ndarray, " C"]
     actor_distance_m: Float64[np.ndarray, " C"]
-    focus_share: Float64[np.ndarray, " C"]
+    focus_fraction: Float64[np.ndarray, " C"]
     travel_m: Float64[np.ndarray, " C"]
-    covered_share: Float64[np.ndarray, " A"]
+    covered_fraction: Float64[np.ndarray, " A"]
     apart_deg: Float64[np.ndarray, " A"]
     violations: tuple[Violation, ...]
 
@@ -81,7 +81,7 @@ def audit_paths(
         position_m = path.world_from_camera[:, :3, 3]
         swept = _sweep(position_m)
         scene_m.append(float(caster.closest_distance(swept.position_m, 10.0).min()))
-        actor_m.append(min(mesh.least_distance_m(swept.position_m, swept.frame, swept.share) for mesh in meshes))
+        actor_m.append(min(mesh.least_distance_m(swept.position_m, swept.frame, swept.fraction) for mesh in meshes))
         travel_m.append(float(np.linalg.norm(np.diff(position_m, axis=0), axis=1).sum()))
         figures = _figures(path, swept, room, fps) | {
             "scene": scene_m[-1],
@@ -89,8 +89,8 @@ def audit_paths(
             "focus": float(seen[view]),
         }
         violations += _violations(f"camera {path.camera}", figures, _view_rules(config))
-    for actor, share, angle_deg in zip(actors, covered, apart_deg, strict=True):
-        figures = {"coverage": float(share), "apart": float(angle_deg)}
+    for actor, fraction, angle_deg in zip(actors, covered, apart_deg, strict=True):
+        figures = {"coverage": float(fraction), "apart": float(angle_deg)}
         violations += _violations(f"actor {actor.actor}", figures, _actor_rules(config))
     return CameraAudit(
         np.array(scene_m), np.array(actor_m), seen, np.array(travel_m), covered, apart_deg, tuple(violations)
@@ -106,11 +106,11 @@ def _mean_apart_deg(apart_rad: Float64[np.ndarray, "T A"]) -> Float64[np.ndarray
 
 @dataclass(frozen=True)
 class _Sweep:
-    """Positions at sub-steps, each at ``share`` of the way from ``frame`` to the next."""
+    """Positions at sub-steps, each at ``fraction`` of the way from ``frame`` to the next."""
 
     position_m: Float64[np.ndarray, "N 3"]
     frame: Int32[np.ndarray, " N"]
-    share: Float64[np.ndarray, " N"]
+    fraction: Float64[np.ndarray, " N"]
 
 
 def _sweep(position_m: Float64[np.ndarray, "T 3"]) -> _Sweep:
@@ -118,9 +118,9 @@ def _sweep(position_m: Float64[np.ndarray, "T 3"]) -> _Sweep:
     steps = max(SUBSTEPS, int(np.ceil(longest_m / SUBSTEP_M)))
     time = np.linspace(0.0, len(position_m) - 1.0, (len(position_m) - 1) * steps + 1)
     frame = np.minimum(time.astype(np.int32), len(position_m) - 2)
-    share = time - frame
-    between = position_m[frame] + share[:, None] * (position_m[frame + 1] - position_m[frame])
-    return _Sweep(between, frame, share)
+    fraction = time - frame
+    between = position_m[frame] + fraction[:, None] * (position_m[frame + 1] - position_m[frame])
+    return _Sweep(between, frame, fraction)
 
 
 def _figures(path: CameraPath, swept: _Sweep, room: Room, fps: float) -> dict[str, float]:

@@ -50,10 +50,10 @@ def bounds_at(bounds: ActorBounds, frame: Float64[np.ndarray, " N"]) -> ActorBou
     last = bounds.axis_m.shape[1] - 1
     low = np.clip(np.floor(frame).astype(int), 0, last)
     high = np.minimum(low + 1, last)
-    share = frame - low
+    fraction = frame - low
 
     def between(values: np.ndarray) -> np.ndarray:
-        weight = share.reshape((1, -1) + (1,) * (values.ndim - 2))
+        weight = fraction.reshape((1, -1) + (1,) * (values.ndim - 2))
         return np.asarray(values[:, low] * (1.0 - weight) + values[:, high] * weight)
 
     return ActorBounds(

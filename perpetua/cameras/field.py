@@ -137,8 +137,8 @@ def polygon_distance_m(
         along = np.clip(offset @ side / max(float(side @ side), 1e-18), 0.0, 1.0)
         nearest_m = np.minimum(nearest_m, np.linalg.norm(offset - along[:, None] * side, axis=1))
         if side[1] != 0.0:
-            share = offset[:, 1] / side[1]
-            inside ^= (share >= 0.0) & (share < 1.0) & (offset[:, 0] < share * side[0])
+            fraction = offset[:, 1] / side[1]
+            inside ^= (fraction >= 0.0) & (fraction < 1.0) & (offset[:, 0] < fraction * side[0])
     return np.where(inside, nearest_m, -nearest_m)
 
 

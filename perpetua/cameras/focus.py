@@ -39,11 +39,11 @@ class FocusSchedule:
         weight = np.zeros((len(times_s), actors))
         weight[:, list(self.segments[0].members)] = 1.0 / len(self.segments[0].members)
         for segment in self.segments[1:]:
-            share = np.clip((times_s - segment.start_s) / HANDOVER_S + 0.5, 0.0, 1.0)[:, None]
-            share = share * share * (3.0 - 2.0 * share)
+            fraction = np.clip((times_s - segment.start_s) / HANDOVER_S + 0.5, 0.0, 1.0)[:, None]
+            fraction = fraction * fraction * (3.0 - 2.0 * fraction)
             following = np.zeros(actors)
             following[list(segment.members)] = 1.0 / len(segment.members)
-            weight = weight * (1.0 - share) + following * share
+            weight = weight * (1.0 - fraction) + following * fraction
         return weight
 
     def members(self, times_s: Float64[np.ndarray, " T"], actors: int) -> Bool[np.ndarray, "T A"]:

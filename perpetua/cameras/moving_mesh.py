@@ -22,9 +22,9 @@ class MovingMesh:
         self,
         points_m: Float64[np.ndarray, "N 3"],
         frame: Int32[np.ndarray, " N"],
-        share: Float64[np.ndarray, " N"],
+        fraction: Float64[np.ndarray, " N"],
     ) -> float:
-        """The least of N distances, each between a point and the mesh ``share`` of the way to the next frame.
+        """The least of N distances, each between a point and the mesh ``fraction`` of the way to the next frame.
 
         Vertices move on straight lines between frames. A group lies within the join of its two frames' boxes, so
         points are measured in the order of how near they could be, until none can be nearer than the nearest.
@@ -35,7 +35,7 @@ class MovingMesh:
         for step in np.argsort(could_be_m, kind="stable"):
             if could_be_m[step] >= nearest_m:
                 break
-            corners_m = self._corners_m(group_m[step] < nearest_m, int(frame[step]), float(share[step]))
+            corners_m = self._corners_m(group_m[step] < nearest_m, int(frame[step]), float(fraction[step]))
             nearest_m = min(nearest_m, _distance_m(points_m[step], corners_m))
         return float(nearest_m)
 
@@ -51,10 +51,10 @@ class MovingMesh:
         beyond_m = np.maximum(np.maximum(low_m - points_m[:, None], points_m[:, None] - high_m), 0.0)
         return np.asarray(np.linalg.norm(beyond_m, axis=-1))
 
-    def _corners_m(self, near: Bool[np.ndarray, " G"], frame: int, share: float) -> Float64[np.ndarray, "F 3 3"]:
+    def _corners_m(self, near: Bool[np.ndarray, " G"], frame: int, fraction: float) -> Float64[np.ndarray, "F 3 3"]:
         faces = np.concatenate([self._groups[group] for group in np.flatnonzero(near)])
         start_m, end_m = self.vertices_m[frame][faces], self.vertices_m[frame + 1][faces]
-        return (1.0 - share) * start_m.astype(np.float64) + share * end_m.astype(np.float64)
+        return (1.0 - fraction) * start_m.astype(np.float64) + fraction * end_m.astype(np.float64)
 
 
 def _face_groups(vertices_m: Float32[np.ndarray, "P 3"], faces: Int32[np.ndarray, "F 3"]) -> list[np.ndarray]:

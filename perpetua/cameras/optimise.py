@@ -32,7 +32,7 @@ CROWD_POINTS = 3
 SCENE_SPARE_M = 0.08
 ACTOR_SPARE_M = 0.25
 # The optimiser keeps well within the limits that the audit enforces.
-SOFT_SHARE = 0.6
+SOFT_FRACTION = 0.6
 LEAST_APART_RAD = np.radians(50.0)
 
 
@@ -93,10 +93,10 @@ def optimise_paths(problem: Problem, config: CamerasConfig) -> Solution:
     )
 
 
-def spline_basis(share: Float64[np.ndarray, " T"], duration_s: float) -> Float64[np.ndarray, "T K"]:
+def spline_basis(fraction: Float64[np.ndarray, " T"], duration_s: float) -> Float64[np.ndarray, "T K"]:
     """Weights of a clamped cubic B-spline's control points at shares (0 to 1) of a duration."""
     controls = max(DEGREE + 1, int(np.ceil(duration_s / CONTROL_S)) + DEGREE)
-    return np.asarray(BSpline.design_matrix(share, _knots(controls), DEGREE).toarray())
+    return np.asarray(BSpline.design_matrix(fraction, _knots(controls), DEGREE).toarray())
 
 
 def _knots(controls: int) -> Float64[np.ndarray, " M"]:
@@ -108,8 +108,8 @@ def _controls_along(path_m: Float64[np.ndarray, "S C T 3"], controls: int) -> Fl
     knots = _knots(controls)
     site = np.mean([knots[1 + i : 1 + i + controls] for i in range(DEGREE)], axis=0) * (path_m.shape[2] - 1)
     low = np.minimum(site.astype(int), path_m.shape[2] - 2)
-    share = (site - low)[:, None]
-    return (1.0 - share) * path_m[:, :, low] + share * path_m[:, :, low + 1]
+    fraction = (site - low)[:, None]
+    return (1.0 - fraction) * path_m[:, :, low] + fraction * path_m[:, :, low + 1]
 
 
 class _Terms:
@@ -139,7 +139,7 @@ class _Terms:
         self.watched_m = _tensor(bounds.chest_m[watched, time])
         # Between head and chest.
         self.sighted_m = self.point_m[:, :, :COVERED_POINTS].mean(2).transpose(0, 1)
-        self.line_share = torch.linspace(0.03, 0.93, LINE_SAMPLES)[:, None]
+        self.line_fraction = torch.linspace(0.03, 0.93, LINE_SAMPLES)[:, None]
         self.still = (self.speed_mps == 0.0)[..., None, None]
 
     def __call__(
@@ -194,7 +194,7 @@ class _Terms:
 
     def _blocked(self, position_m: Float[Tensor, "S C T 3"]) -> Float[Tensor, "S C T A"]:
         sight_m = self.sighted_m - position_m[..., None, :]
-        line_m = position_m[..., None, None, :] + self.line_share * sight_m[..., None, :]
+        line_m = position_m[..., None, None, :] + self.line_fraction * sight_m[..., None, :]
         return losses.blocked(losses.field_distance(self.grid, self.origin_m, self.voxel_m, line_m), LINE_WANTED_M)
 
     def _motion(
@@ -205,14 +205,14 @@ class _Terms:
         acceleration = velocity.diff(dim=2) / self.step_s
         turning = forward.diff(dim=2) / self.step_s
         turning_change = turning.diff(dim=2) / self.step_s
-        steepest = torch.tensor(np.sin(np.radians(config.max_pitch_deg * SOFT_SHARE)), dtype=forward.dtype)
+        steepest = torch.tensor(np.sin(np.radians(config.max_pitch_deg * SOFT_FRACTION)), dtype=forward.dtype)
         low_m, high_m = self.height_band_m.unbind(-1)
         return {
             "smoothness": losses.unsteadiness(acceleration, 1.0),
             "rotation": losses.unsteadiness(turning, 0.5) + losses.unsteadiness(turning_change, 1.0),
-            "limits": losses.over_limit(_length(velocity), SOFT_SHARE * config.max_speed_mps)
-            + losses.over_limit(_length(acceleration), SOFT_SHARE * config.max_acceleration_mps2)
-            + losses.over_limit(_length(turning), SOFT_SHARE * float(np.radians(config.max_turn_deg_per_s))),
+            "limits": losses.over_limit(_length(velocity), SOFT_FRACTION * config.max_speed_mps)
+            + losses.over_limit(_length(acceleration), SOFT_FRACTION * config.max_acceleration_mps2)
+            + losses.over_limit(_length(turning), SOFT_FRACTION * float(np.radians(config.max_turn_deg_per_s))),
             "travel": losses.travel(position_m, self.step_s, self.speed_mps),
             "revisiting": losses.revisiting(position_m, self.step_s),
             "height": losses.outside_band(position_m[..., 2], low_m, high_m, 0.3),

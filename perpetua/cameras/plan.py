@@ -49,9 +49,9 @@ class CameraPlan:
         return {
             "scene_distance_m": self.audit.scene_distance_m.tolist(),
             "actor_distance_m": self.audit.actor_distance_m.tolist(),
-            "focus_share": self.audit.focus_share.tolist(),
+            "focus_share": self.audit.focus_fraction.tolist(),
             "travel_m": self.audit.travel_m.tolist(),
-            "covered_share": self.audit.covered_share.tolist(),
+            "covered_share": self.audit.covered_fraction.tolist(),
             "apart_deg": self.audit.apart_deg.tolist(),
             "loss_terms": self.terms,
             "redraw": self.redraw,
@@ -130,7 +130,7 @@ def camera_scene(
     room: Room, actors: tuple[ActorMesh, ...], config: CamerasConfig, fps: float, width_px: int, height_px: int
 ) -> CameraScene:
     """Measures the room and its actors, once for all candidates."""
-    caster = Caster(join([thing.mesh for thing in room.objects]))
+    caster = Caster(join([obj.mesh for obj in room.objects]))
     field = signed_distance_field(room, caster, config.voxel_m)
     meshes = tuple(MovingMesh(actor) for actor in actors)
     return CameraScene(room, actors, meshes, actor_bounds(actors), caster, field, fps, width_px, height_px)

@@ -139,13 +139,13 @@ def _height_band_m(height: Height, room_height_m: float) -> tuple[float, float]:
     return bands[height]
 
 
-def _draw_sway(rng: np.random.Generator, config: CamerasConfig, share: float) -> Sway:
+def _draw_sway(rng: np.random.Generator, config: CamerasConfig, fraction: float) -> Sway:
     shape = (6, SWAY_HARMONICS)
     frequency_hz = rng.uniform(*SWAY_HZ, shape)
     # Slow sway is wide, quick sway is small, as of a hand.
     falloff = SWAY_HZ[0] / frequency_hz
     limit = np.array([config.sway_m] * 3 + [np.radians(config.sway_deg)] * 3)[:, None]
-    amplitude = share * limit * falloff / falloff.sum(axis=1, keepdims=True)
+    amplitude = fraction * limit * falloff / falloff.sum(axis=1, keepdims=True)
     return Sway(amplitude, frequency_hz, rng.uniform(0.0, 2.0 * np.pi, shape))
 
 

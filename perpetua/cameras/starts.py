@@ -38,8 +38,8 @@ AZIMUTH_COST = 1.5
 # Steps of a view that stands still cost this much for each metre.
 STILL_COST_PER_M = 1e3
 SIGHT_POINTS = 2
-IMAGE_SHARE = 0.9
-SEEN_SHARE = 0.5
+IMAGE_FRACTION = 0.9
+SEEN_FRACTION = 0.5
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ class _View:
         ]
         chain, cost = _cheapest_chain(place_cost, self.step_cost + np.stack(style_cost))
         knot = np.round(np.arange(len(focus_m)) / MOMENTS).astype(int)
-        sees = seen[np.array(chain)[knot], np.arange(len(focus_m))] >= SEEN_SHARE
+        sees = seen[np.array(chain)[knot], np.arange(len(focus_m))] >= SEEN_FRACTION
         return _Chain(ViewStart(schedule, self.places_m[chain]), sees, cost)
 
 
@@ -205,7 +205,7 @@ def _in_image(
     world_from_camera = look_at(*np.broadcast_arrays(places_m[:, None], focus_m[None]))
     offset_m = np.swapaxes(bounds.point_m[:, :, :SIGHT_POINTS], 0, 1) - places_m[:, None, None, None]
     in_camera_m = np.einsum("nfji,nfalj->nfali", world_from_camera[..., :3, :3], offset_m)
-    reach = IMAGE_SHARE * np.tan(0.5 * wish.fov_rad) * np.array([1.0, aspect]) * in_camera_m[..., 2:]
+    reach = IMAGE_FRACTION * np.tan(0.5 * wish.fov_rad) * np.array([1.0, aspect]) * in_camera_m[..., 2:]
     return np.asarray((np.abs(in_camera_m[..., :2]) < reach).all(axis=-1))
 
 
@@ -269,9 +269,11 @@ def _blocked(
     field: SignedDistanceField,
     config: CamerasConfig,
 ) -> Bool[np.ndarray, "N N"]:
-    share = np.linspace(0.0, 1.0, EDGE_SAMPLES)[:, None, None, None]
+    fraction = np.linspace(0.0, 1.0, EDGE_SAMPLES)[:, None, None, None]
     # A place in a nook may lie nearer to the scene than the limit; the optimiser moves it out.
-    return np.asarray((distance_at_m(field, places_m[:, None] + share * step_m) < config.scene_clearance_m).any(axis=0))
+    return np.asarray(
+        (distance_at_m(field, places_m[:, None] + fraction * step_m) < config.scene_clearance_m).any(axis=0)
+    )
 
 
 def _cheapest_chain(

@@ -13,33 +13,33 @@ from perpetua.scene.camera import CameraPath
 
 POINTS = 16
 UPPER_BODY_LEVEL = 0.5
-SEEN_SHARE = 0.5
+SEEN_FRACTION = 0.5
 
 
 @dataclass(frozen=True)
 class ViewCoverage:
     """What C views show of A actors over T frames.
 
-    ``seen_share`` is the share of an actor's head and torso points that lie inside the image with no triangle of
+    ``seen_fraction`` is the share of an actor's head and torso points that lie inside the image with no triangle of
     the room between. ``apart_rad`` is the angle at each actor, in the plane, between the two most different of the
-    views that see it: at least ``SEEN_SHARE`` of it. Where fewer than two do it is NaN.
+    views that see it: at least ``SEEN_FRACTION`` of it. Where fewer than two do it is NaN.
     """
 
-    seen_share: Float64[np.ndarray, "C T A"]
+    seen_fraction: Float64[np.ndarray, "C T A"]
     apart_rad: Float64[np.ndarray, "T A"]
 
     @property
     def sees(self) -> Bool[np.ndarray, "C T A"]:
         """Which views see which actors."""
-        return np.asarray(self.seen_share >= SEEN_SHARE)
+        return np.asarray(self.seen_fraction >= SEEN_FRACTION)
 
 
 def view_coverage(paths: tuple[CameraPath, ...], actors: tuple[ActorMesh, ...], caster: Caster) -> ViewCoverage:
     """Measures the views; ``caster`` casts against the room's meshes."""
     points_m = np.stack([_upper_body_m(actor) for actor in actors], axis=1)
-    seen = np.stack([_seen_share(path, points_m, caster) for path in paths])
+    seen = np.stack([_seen_fraction(path, points_m, caster) for path in paths])
     positions_m = np.stack([path.world_from_camera[:, :3, 3] for path in paths])
-    return ViewCoverage(seen, _apart_rad(positions_m, points_m.mean(axis=2), seen >= SEEN_SHARE))
+    return ViewCoverage(seen, _apart_rad(positions_m, points_m.mean(axis=2), seen >= SEEN_FRACTION))
 
 
 def _upper_body_m(actor: ActorMesh) -> Float64[np.ndarray, "T N 3"]:
@@ -51,7 +51,7 @@ def _upper_body_m(actor: ActorMesh) -> Float64[np.ndarray, "T N 3"]:
     return np.asarray(actor.vertices_m[:, chosen], np.float64)
 
 
-def _seen_share(path: CameraPath, points_m: Float64[np.ndarray, "T A N 3"], caster: Caster) -> np.ndarray:
+def _seen_fraction(path: CameraPath, points_m: Float64[np.ndarray, "T A N 3"], caster: Caster) -> np.ndarray:
     frames, actors, count, _ = points_m.shape
     flat_m = points_m.reshape(frames, -1, 3)
     in_camera_m = transform_points(invert_rigid(path.world_from_camera), flat_m)

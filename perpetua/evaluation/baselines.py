@@ -18,7 +18,7 @@ from perpetua.evaluation.protocol import Truth
 from perpetua.formats.reader import Sequence, SequenceView
 from perpetua.geometry.transforms import invert_rigid, transform_points
 
-SAME_DEPTH_SHARE = 0.05
+SAME_DEPTH_FRACTION = 0.05
 # Lucas-Kanade: side of the window, times the image is halved, how far apart ways forth and back may end.
 WINDOW_PX, HALVINGS, RETURN_PX = 21, 3, 1.0
 # A point that leaps further from one frame to the next has slid onto another surface.
@@ -168,4 +168,4 @@ def _depth_agrees(view: SequenceView, frame: int, point_m: Float64[np.ndarray, "
     depth_m = np.where(point_m[:, 2] > 0.0, point_m[:, 2], np.nan)
     pixel_px = np.stack([fx * point_m[:, 0] / depth_m + cx, fy * point_m[:, 1] / depth_m + cy], axis=1)
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(_depth_at(view, frame, pixel_px) - depth_m) <= SAME_DEPTH_SHARE * depth_m)
+        return np.asarray(np.abs(_depth_at(view, frame, pixel_px) - depth_m) <= SAME_DEPTH_FRACTION * depth_m)

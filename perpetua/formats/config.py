@@ -31,12 +31,12 @@ class ExportConfig(Section):
 
     @field_validator("splits")
     @classmethod
-    def _shares_sum_to_one(cls, splits: dict[str, float]) -> dict[str, float]:
-        for name, share in splits.items():
+    def _fractions_sum_to_one(cls, splits: dict[str, float]) -> dict[str, float]:
+        for name, fraction in splits.items():
             if _FOLDER_NAME.fullmatch(name) is None:
                 raise ValueError(f"must have names of letters, digits, '-' and '_', so '{name}' cannot be a split")
-            if not 0.0 <= share <= 1.0:
-                raise ValueError(f"must have shares in 0..1, so '{name}' cannot have {share}")
+            if not 0.0 <= fraction <= 1.0:
+                raise ValueError(f"must have shares in 0..1, so '{name}' cannot have {fraction}")
         if not isclose(sum(splits.values()), 1.0, abs_tol=1e-6):
             raise ValueError(f"must have shares that sum to 1, and they sum to {sum(splits.values()):g}")
         return splits

@@ -17,7 +17,7 @@ Ours, beside it::
     audit.json                 what the checks of the sequence and of its motion found
     surface_xyz.npy            (F,P,3,3) float32  world positions of the corners of each track's triangle
     object_poses.npy           (F,K,4,4) float32  world from object, for the K objects of sequence.json in their order;
-                                          a person's frame is the pelvis (X forward, Y left), a thing's stands upright
+                                          a person's frame is the pelvis (X forward, Y left), an object's stands upright
                                           in the middle of its box
     object_boxes.npy           (F,K,2,3) float32  lowest and highest corner of each object, in its own frame
     <view>/tracks_xy.npy       (F,P,2) float32    pixels of the tracks, also where hidden or off the image; NaN behind

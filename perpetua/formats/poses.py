@@ -29,11 +29,11 @@ def object_poses(scene: FilmedScene) -> ObjectPoses:
     count = len(scene.room.objects) + len(scene.actors)
     world_from_object = np.empty((scene.frames, count, 4, 4), np.float32)
     box_m = np.empty((scene.frames, count, 2, 3), np.float32)
-    for place, thing in enumerate(scene.room.objects):
-        pose = resting_pose(thing.mesh.vertices_m)
+    for place, obj in enumerate(scene.room.objects):
+        pose = resting_pose(obj.mesh.vertices_m)
         world_from_object[:, place] = pose
         # In the frame as it is stored, so that the stored box holds what it should.
-        box_m[:, place] = _box_m(world_from_object[0, place], thing.mesh.vertices_m)
+        box_m[:, place] = _box_m(world_from_object[0, place], obj.mesh.vertices_m)
     for place, (motion, actor) in enumerate(zip(scene.motions, scene.actors, strict=True), len(scene.room.objects)):
         world_from_object[:, place] = _pelvis_poses(motion)
         box_m[:, place] = _moving_boxes_m(world_from_object[:, place], actor)
@@ -41,7 +41,7 @@ def object_poses(scene: FilmedScene) -> ObjectPoses:
 
 
 def resting_pose(vertices_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, "4 4"]:
-    """The upright frame of a thing that stands still; the world's own for a thing without vertices."""
+    """The upright frame of an object that stands still; the world's own for an object without vertices."""
     pose = np.eye(4)
     if len(vertices_m) == 0:
         return pose

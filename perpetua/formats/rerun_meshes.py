@@ -18,7 +18,7 @@ SRGB_POWER = 1.0 / 2.2
 
 @dataclass(frozen=True)
 class StillMesh:
-    """A thing of the room, of one colour, under its path in the recording."""
+    """An object of the room, of one colour, under its path in the recording."""
 
     path: str
     vertices_m: Float64[np.ndarray, "P 3"]
@@ -27,14 +27,14 @@ class StillMesh:
 
 
 def still_meshes(source: ExportSource, meshes: KeptMeshes) -> Iterator[StillMesh]:
-    """The things of a room; those of its shell below ``shell``, the others below ``room``."""
+    """The objects of a room; those of its shell below ``shell``, the others below ``room``."""
     colours = _seen_colours(source)
-    for thing in meshes.room.objects:
-        if len(thing.mesh.faces):
-            group = "shell" if thing.category in SHELL else "room"
-            path = f"world/{group}/{entity_name(source, thing.object_index)}"
-            colour = colours.get(thing.object_index, UNSEEN)
-            yield StillMesh(path, thing.mesh.vertices_m, thing.mesh.faces, colour)
+    for obj in meshes.room.objects:
+        if len(obj.mesh.faces):
+            group = "shell" if obj.category in SHELL else "room"
+            path = f"world/{group}/{entity_name(source, obj.object_index)}"
+            colour = colours.get(obj.object_index, UNSEEN)
+            yield StillMesh(path, obj.mesh.vertices_m, obj.mesh.faces, colour)
 
 
 def entity_name(source: ExportSource, index: int) -> str:

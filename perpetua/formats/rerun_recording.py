@@ -197,6 +197,6 @@ def _tracks_by_object(source: ExportSource) -> dict[str, Int64[np.ndarray, " _"]
 
 
 def _track_colours(source: ExportSource) -> UInt8[np.ndarray, "P 3"]:
-    """One colour per object: people bright, things pale."""
+    """One colour per object: people bright, objects pale."""
     palette = {index: source.object_colour(index) for index in np.unique(source.track_object).tolist()}
     return np.array([palette[index] for index in source.track_object.tolist()], np.uint8).reshape(-1, 3)

@@ -85,7 +85,7 @@ class ExportSource:
     @cached_property
     def object_name(self) -> dict[int, str]:
         """Names of the objects in ``sequence.json``, by object index; a name that several share gets the index."""
-        named = {int(thing["object_index"]): str(thing.get("name", thing["category"])) for thing in self._objects}
+        named = {int(obj["object_index"]): str(obj.get("name", obj["category"])) for obj in self._objects}
         shared = Counter(named.values())
         return {index: name if shared[name] == 1 else f"{name}_{index}" for index, name in named.items()}
 
@@ -94,10 +94,10 @@ class ExportSource:
         """Object indices of the people; without a record 1, by the rule of ``track_object``."""
         if not self._objects:
             return frozenset({1})
-        return frozenset(int(thing["object_index"]) for thing in self._objects if thing["category"] == PERSON)
+        return frozenset(int(obj["object_index"]) for obj in self._objects if obj["category"] == PERSON)
 
     def object_colour(self, index: int) -> tuple[int, int, int]:
-        """A colour that tells an object from others: people bright, things pale."""
+        """A colour that tells an object from others: people bright, objects pale."""
         # Steps of the golden ratio keep neighbouring indices far apart in hue.
         person = index in self.people
         red, green, blue = colorsys.hsv_to_rgb(index * 0.618034 % 1.0, 0.9 if person else 0.35, 1.0 if person else 0.8)

@@ -88,7 +88,7 @@ def _write_frames(folder: Path, view: RenderedView, actor_indices: list[int]) ->
 
 
 def _write_record(folder: Path, points: PointTracks, record: dict[str, Any]) -> None:
-    objects = {thing["object_index"]: thing for thing in record.get("objects", [])}
+    objects = {obj["object_index"]: obj for obj in record.get("objects", [])}
     owners = [objects.get(index, {}) for index in points.object_index.tolist()]
     merged = {
         **record,

@@ -9,7 +9,7 @@ from perpetua.geometry.pinhole import inside_image, project
 from perpetua.geometry.transforms import transform_points
 from perpetua.labels.pixels import LabelledScene, PixelSurfaces
 from perpetua.tracks.sight import NOTHING
-from perpetua.tracks.visibility import REACHED_M, REACHED_SHARE
+from perpetua.tracks.visibility import REACHED_FRACTION, REACHED_M
 
 # What becomes of a pixel's point in another image.
 NONE, SEEN, HIDDEN, OUTSIDE = range(4)
@@ -57,7 +57,7 @@ def flow(scene: LabelledScene, surfaces: PixelSurfaces, view: int, frame: int) -
     met = scene.sight.first_hit(frame, eye_m, offset_m)
     points = surfaces.bound.points
     length_m = np.linalg.norm(offset_m, axis=1)
-    reached = met.distance_m >= length_m * (1.0 - REACHED_SHARE) - REACHED_M
+    reached = met.distance_m >= length_m * (1.0 - REACHED_FRACTION) - REACHED_M
     reached |= (met.object_index == points.object_index[chosen]) & (met.face == points.face[chosen])
     reached |= met.object_index == NOTHING
     state[chosen] = np.where(reached, SEEN, HIDDEN)

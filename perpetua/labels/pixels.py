@@ -17,7 +17,7 @@ from perpetua.tracks.pixel_hits import hit_pixels
 from perpetua.tracks.placed import as_exported
 from perpetua.tracks.sight import SceneSight
 from perpetua.tracks.surface import BoundPoints, SceneMeshes, bind
-from perpetua.tracks.visibility import SAME_DEPTH_M, SAME_DEPTH_SHARE, exported_intrinsics
+from perpetua.tracks.visibility import SAME_DEPTH_FRACTION, SAME_DEPTH_M, exported_intrinsics
 
 # Rays that are cast at a time: memory grows with it.
 BLOCK_PIXELS = 1 << 18
@@ -85,5 +85,5 @@ class LabelledScene:
         rendered_m = np.asarray(seen.depth_m[frame]).reshape(-1)[block.start : block.stop][place]
         shown = np.asarray(seen.object_index[frame]).reshape(-1)[block.start : block.stop][place]
         depth_m = transform_points(camera_from_world, bound.point_m(frame))[:, 2]
-        close = np.abs(rendered_m - depth_m) <= SAME_DEPTH_M + SAME_DEPTH_SHARE * depth_m
+        close = np.abs(rendered_m - depth_m) <= SAME_DEPTH_M + SAME_DEPTH_FRACTION * depth_m
         return np.asarray(close & (shown == bound.points.object_index))

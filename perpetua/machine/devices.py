@@ -36,9 +36,9 @@ def machine_share() -> MachineShare:
     return MachineShare(worker, workers) if 0 <= worker < workers else MachineShare()
 
 
-def cpu_threads(wanted: int, share: MachineShare) -> int:
+def cpu_threads(wanted: int, fraction: MachineShare) -> int:
     """Threads for one Blender: as set, or else an even share of the cores that this process may use; at least 1."""
-    return wanted or max(1, usable_cores() // share.workers)
+    return wanted or max(1, usable_cores() // fraction.workers)
 
 
 def usable_cores() -> int:

@@ -20,7 +20,7 @@ State = Literal["ok", "missing", "optional"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at; ``remedy`` says what to do when it is missing."""
+    """One object looked at; ``remedy`` says what to do when it is missing."""
 
     subject: str
     state: State

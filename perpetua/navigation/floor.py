@@ -61,8 +61,8 @@ class WalkableFloor:
     def line_cost(self, start_m: Float64[np.ndarray, "2"], end_m: Float64[np.ndarray, "2"]) -> float:
         """Cost of the straight line between two points; infinite where it leaves the free floor."""
         length_m = float(np.hypot(*(end_m - start_m)))
-        share = (np.arange(max(1, round(length_m / SAMPLE_M))) + 0.5) / max(1, round(length_m / SAMPLE_M))
-        place = (start_m + share[:, None] * (end_m - start_m) - self.grid.origin_m) / self.grid.cell_m
+        fraction = (np.arange(max(1, round(length_m / SAMPLE_M))) + 0.5) / max(1, round(length_m / SAMPLE_M))
+        place = (start_m + fraction[:, None] * (end_m - start_m) - self.grid.origin_m) / self.grid.cell_m
         prices = ndimage.map_coordinates(self._price, place.T, order=0, mode="constant", cval=np.inf)
         return length_m * float(prices.mean())
 

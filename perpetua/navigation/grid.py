@@ -74,10 +74,10 @@ def _at_centres(values: Float64[np.ndarray, "A B"] | Float32[np.ndarray, "A B"],
 def _floor_heights(room: Room, fine: Raster) -> Float32[np.ndarray, "X Y"]:
     """Height of the highest walkable surface in each cell, NaN where there is none."""
     height_m = np.full(fine.shape[0] * fine.shape[1], -np.inf, np.float32)
-    for thing in room.objects:
-        if not thing.walkable:
+    for obj in room.objects:
+        if not obj.walkable:
             continue
-        corners_m = thing.mesh.vertices_m[thing.mesh.faces]
+        corners_m = obj.mesh.vertices_m[obj.mesh.faces]
         normal = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
         upward = normal[:, 2] > MIN_UPWARD_NORMAL * np.linalg.norm(normal, axis=1)
         for touches in touched_cells(fine, corners_m[upward], -FLOOR_RANGE_M, FLOOR_RANGE_M):
@@ -99,17 +99,17 @@ def _obstacles(
     lowest_m = float(np.nanmin(floor_z_m)) + config.step_m
     highest_m = float(np.nanmax(floor_z_m)) + config.body_height_m
     blocked = no_floor.ravel()
-    # Large things first: most small ones stand on them and need no closer look.
-    for thing in sorted(room.objects, key=lambda other: -_footprint_m2(other)):
-        corners_m = thing.mesh.vertices_m[thing.mesh.faces]
+    # Large objects first: most small ones stand on them and need no closer look.
+    for obj in sorted(room.objects, key=lambda other: -_footprint_m2(other)):
+        corners_m = obj.mesh.vertices_m[obj.mesh.faces]
         for touches in touched_cells(fine, corners_m, lowest_m, highest_m, blocked.reshape(fine.shape)):
             hit = (touches.high_z_m > low_z_m[touches.cell]) & (touches.low_z_m < high_z_m[touches.cell])
             blocked[touches.cell[hit]] = True
     return np.asarray(blocked.reshape(fine.shape) | _too_high_steps(floor_z_m, config.step_m))
 
 
-def _footprint_m2(thing: SceneObject) -> float:
-    return float(np.ptp(thing.mesh.vertices_m[:, :2], axis=0).prod()) if len(thing.mesh.vertices_m) else 0.0
+def _footprint_m2(obj: SceneObject) -> float:
+    return float(np.ptp(obj.mesh.vertices_m[:, :2], axis=0).prod()) if len(obj.mesh.vertices_m) else 0.0
 
 
 def _too_high_steps(floor_z_m: Float32[np.ndarray, "X Y"], step_m: float) -> Bool[np.ndarray, "X Y"]:

@@ -1,6 +1,6 @@
 """Places worth a pause: before what there is to see, and at worktops.
 
-A thing is looked at from where its front is in sight from eye height, at a distance that suits its size; one stands
+An object is looked at from where its front is in sight from eye height, at a distance that suits its size; one stands
 at a table or counter as close as the free floor allows, facing its top. What counts is shape first, and the
 category's words only where shape cannot tell (a sofa's back is as high as a counter).
 """
@@ -58,7 +58,7 @@ _NO_WORKTOP = frozenset(
     ]
 )
 EYE_M = 1.55
-# Things whose size is at least this, at a height where people look.
+# Objects whose size is at least this, at a height where people look.
 MIN_SIZE_M = 0.25
 SEEN_BAND_M = (0.6, 2.2)
 WORKTOP_BAND_M = (0.68, 1.15)
@@ -66,9 +66,9 @@ MIN_WORKTOP_M = 0.3
 # A worktop is stood at no farther from its edge than this; the target lies so far inside the edge.
 ARM_REACH_M = 0.5
 TARGET_INSIDE_M = 0.2
-# Standing places are tried on this spacing, at most so many per thing.
+# Standing places are tried on this spacing, at most so many per object.
 SPACING_M = 0.2
-PLACES_PER_THING = 10
+PLACES_PER_OBJECT = 10
 # A front is seen well down to this cosine between the line of sight and the surface's normal.
 MIN_FRONTAL = 0.5
 ON_TARGET_M = 0.35
@@ -76,9 +76,9 @@ ON_TARGET_M = 0.35
 
 @dataclass(frozen=True)
 class _View:
-    """A thing, seen from candidate places: ``wish_m`` is where each one looks."""
+    """An object, seen from candidate places: ``wish_m`` is where each one looks."""
 
-    thing: SceneObject
+    obj: SceneObject
     purpose: str
     place_m: Float64[np.ndarray, "N 2"]
     wish_m: Float64[np.ndarray, "N 3"]
@@ -88,11 +88,11 @@ def find_spots(room: Room, floor: WalkableFloor) -> tuple[Spot, ...]:
     """Spots to look from and to stand at, in the order of the room's objects."""
     cell = np.round((floor.points_m - floor.grid.origin_m) / floor.grid.cell_m).astype(int)
     coarse = (cell % max(1, round(SPACING_M / floor.grid.cell_m)) == 0).all(axis=1)
-    views = [view for thing in room.objects for view in _views(thing, floor, floor.points_m[coarse])]
+    views = [view for obj in room.objects for view in _views(obj, floor, floor.points_m[coarse])]
     if not views:
         return ()
-    caster = Caster(join([thing.mesh for thing in room.objects]))
-    owner = np.repeat([thing.object_index for thing in room.objects], [len(t.mesh.faces) for t in room.objects])
+    caster = Caster(join([obj.mesh for obj in room.objects]))
+    owner = np.repeat([obj.object_index for obj in room.objects], [len(t.mesh.faces) for t in room.objects])
     corners_m = caster.mesh.vertices_m[caster.mesh.faces]
     spots: list[Spot] = []
     for view in views:
@@ -108,31 +108,31 @@ def _words(category: str) -> frozenset[str]:
     return frozenset(re.findall(r"[a-z]+", category.lower()))
 
 
-def _views(thing: SceneObject, floor: WalkableFloor, places_m: Float64[np.ndarray, "N 2"]) -> list[_View]:
-    if thing.walkable or not len(thing.mesh.faces) or _words(thing.category) & _SHELL:
+def _views(obj: SceneObject, floor: WalkableFloor, places_m: Float64[np.ndarray, "N 2"]) -> list[_View]:
+    if obj.walkable or not len(obj.mesh.faces) or _words(obj.category) & _SHELL:
         return []
     views = []
-    low, high = thing.mesh.vertices_m.min(0), thing.mesh.vertices_m.max(0)
+    low, high = obj.mesh.vertices_m.min(0), obj.mesh.vertices_m.max(0)
     size_m = high - low
     outside_m = np.linalg.norm(np.maximum(np.maximum(low[:2] - places_m, places_m - high[:2]), 0.0), axis=1)
     is_worktop = WORKTOP_BAND_M[0] <= high[2] <= WORKTOP_BAND_M[1] and size_m[:2].min() >= MIN_WORKTOP_M
-    if is_worktop and not _words(thing.category) & _NO_WORKTOP:
+    if is_worktop and not _words(obj.category) & _NO_WORKTOP:
         chosen = _nearest_to(outside_m, 0.0, ARM_REACH_M)
         inset = np.minimum(TARGET_INSIDE_M, 0.5 * size_m[:2])
         wish_m = np.clip(places_m[chosen], low[:2] + inset, high[:2] - inset)
         heights_m = np.full((len(chosen), 1), high[2])
-        views.append(_View(thing, "stand", places_m[chosen], np.hstack([wish_m, heights_m])))
+        views.append(_View(obj, "stand", places_m[chosen], np.hstack([wish_m, heights_m])))
     seen_low, seen_high = max(low[2], SEEN_BAND_M[0]), min(high[2], SEEN_BAND_M[1])
     if seen_low < seen_high and size_m.max() >= MIN_SIZE_M and not is_worktop:
         chosen = _nearest_to(outside_m, 0.6 + 0.5 * float(size_m.max()), 2.5)
         middle = np.append(0.5 * (low + high)[:2], np.clip(EYE_M - 0.1, seen_low, seen_high))
-        views.append(_View(thing, "look", places_m[chosen], np.tile(middle, (len(chosen), 1))))
+        views.append(_View(obj, "look", places_m[chosen], np.tile(middle, (len(chosen), 1))))
     return views
 
 
 def _nearest_to(distance_m: Float64[np.ndarray, " N"], ideal_m: float, farthest_m: float) -> Int64[np.ndarray, " K"]:
     """The places whose distance suits best."""
-    order = np.argsort(np.abs(distance_m - ideal_m), kind="stable")[:PLACES_PER_THING]
+    order = np.argsort(np.abs(distance_m - ideal_m), kind="stable")[:PLACES_PER_OBJECT]
     return order[distance_m[order] <= farthest_m]
 
 
@@ -144,7 +144,7 @@ def _seen(
     owner: Int64[np.ndarray, " F"],
     corners_m: Float64[np.ndarray, "F 3 3"],
 ) -> np.ndarray:
-    """From which places the line of sight ends on the thing (or on what stands on it), and on its front."""
+    """From which places the line of sight ends on the object (or on what stands on it), and on its front."""
     near = np.linalg.norm(hit_m - view.wish_m, axis=1) < ON_TARGET_M
     if view.purpose == "stand":
         return np.asarray(hits.hit & near)
@@ -154,7 +154,7 @@ def _seen(
     frontal = np.abs((normal * sight).sum(1)) > MIN_FRONTAL * np.linalg.norm(normal, axis=1) * np.linalg.norm(
         sight, axis=1
     )
-    return np.asarray(hits.hit & (owner[hits.face] == view.thing.object_index) & frontal)
+    return np.asarray(hits.hit & (owner[hits.face] == view.obj.object_index) & frontal)
 
 
 def _spot(view: _View, place_m: Float64[np.ndarray, "2"], target_m: Float64[np.ndarray, "3"]) -> Spot:
@@ -162,4 +162,4 @@ def _spot(view: _View, place_m: Float64[np.ndarray, "2"], target_m: Float64[np.n
     x, y, z = (float(value) for value in target_m)
     facing_rad = float(np.arctan2(away_m[1], away_m[0]))
     place = (float(place_m[0]), float(place_m[1]))
-    return Spot(place, facing_rad, view.purpose, view.thing.object_index, (x, y, z))
+    return Spot(place, facing_rad, view.purpose, view.obj.object_index, (x, y, z))

@@ -39,12 +39,12 @@ SEAT_WAY_M = (0.8, 3.0)
 class Manner:
     """How a person gets about.
 
-    ``speeds_mps`` are the paces that legs are walked at, drawn by ``shares``; none: the person stays where it starts.
+    ``speeds_mps`` are the paces that legs are walked at, drawn by ``fractions``; none: the person stays at its start.
     ``pause_share`` is the share of time spent pausing. ``seats``: sit down on one of them first.
     """
 
     speeds_mps: tuple[float, ...]
-    shares: tuple[float, ...]
+    fractions: tuple[float, ...]
     pause_share: float
     seats: tuple[Spot, ...] = ()
 
@@ -105,7 +105,7 @@ def random_walk(
 def _stand(
     floor: WalkableFloor, rng: np.random.Generator, spots: tuple[Spot, ...], start: int, steps: int, step_s: float
 ) -> Walk:
-    """Standing at the spot nearest to the start, and looking from there at one thing after the other."""
+    """Standing at the spot nearest to the start, and looking from there at one object after the other."""
     place_m = floor.points_m[start]
     if spots:
         place_m = np.array(spots[_Spots(floor, spots).near(place_m, rng)].place_m)
@@ -143,10 +143,12 @@ def _wander(
     speeds: list[float] = []
     visited_m = [floor.points_m[[start]]]
     here, elapsed_s, arrival_rad = start, sum(stop.looking_s for stop in stops), None
-    shares = np.array(manner.shares) / np.sum(manner.shares)
+    fractions = np.array(manner.fractions) / np.sum(manner.fractions)
     # More than enough time, since what is reckoned here leaves out slow curves.
     while elapsed_s < 1.2 * seconds + 2.0:
-        speed_mps = float(rng.choice(manner.speeds_mps, p=shares)) * float(np.clip(rng.normal(1.0, 0.07), 0.85, 1.12))
+        speed_mps = float(rng.choice(manner.speeds_mps, p=fractions)) * float(
+            np.clip(rng.normal(1.0, 0.07), 0.85, 1.12)
+        )
         pauses = bool(rng.uniform() < _pause_chance(manner, speed_mps))
         ways = floor.ways_from(here)
         leg = _leg_to_seat(floor, ways, seats) if seats else None

@@ -22,7 +22,7 @@ _ROOM_FILES = 60
 _INFINIGEN_ROOM_MB = 3500.0
 _OTHER_ROOM_MB = 2200.0
 # A disk that will be fuller than this share of what is free now is worth a word.
-TIGHT_SHARE = 0.8
+TIGHT_FRACTION = 0.8
 
 
 @dataclass(frozen=True)

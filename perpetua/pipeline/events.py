@@ -20,7 +20,7 @@ EventKind = Literal[
 
 @dataclass(frozen=True)
 class Event:
-    """One thing that happened to one room. Fields that do not apply keep their defaults."""
+    """One object that happened to one room. Fields that do not apply keep their defaults."""
 
     kind: EventKind
     room: int

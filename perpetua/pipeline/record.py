@@ -25,7 +25,7 @@ def sequence_record(
     config: Config, seed: StageSeed, room: Room, routes: tuple[Route, ...], actors: tuple[ActorMesh, ...]
 ) -> dict[str, Any]:
     """Seed, config, object table with footprints, routes, versions and licences, as JSON values."""
-    table = [_object_entry(thing) for thing in room.objects]
+    table = [_object_entry(obj) for obj in room.objects]
     table += [
         {
             "object_index": actor.object_index,
@@ -56,16 +56,16 @@ def sequence_record(
     }
 
 
-def _object_entry(thing: SceneObject) -> dict[str, Any]:
-    heights_m = thing.mesh.vertices_m[:, 2]
+def _object_entry(obj: SceneObject) -> dict[str, Any]:
+    heights_m = obj.mesh.vertices_m[:, 2]
     low_m, high_m = (float(heights_m.min()), float(heights_m.max())) if len(heights_m) else (0.0, 0.0)
     return {
-        "object_index": thing.object_index,
-        "name": thing.name,
-        "category": thing.category,
-        "walkable": thing.walkable,
+        "object_index": obj.object_index,
+        "name": obj.name,
+        "category": obj.category,
+        "walkable": obj.walkable,
         "height_range_m": [round(low_m, 4), round(high_m, 4)],
-        "footprint_m": _footprint_m(thing.mesh),
+        "footprint_m": _footprint_m(obj.mesh),
     }
 
 

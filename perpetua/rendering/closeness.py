@@ -32,15 +32,15 @@ def measure_closeness(room: Room, cameras: tuple[CameraPath, ...]) -> Closeness:
 
     Pixels per metre are those of a surface that faces the camera: the side along which a slanted one is seen in full.
     """
-    things = [thing for thing in room.objects if len(thing.mesh.faces)]
-    if not things:
+    objs = [obj for obj in room.objects if len(obj.mesh.faces)]
+    if not objs:
         return Closeness(np.zeros(0, np.uint16), np.zeros(0, np.int32), np.zeros(0, np.float32))
-    caster = Caster(join([thing.mesh for thing in things]))
-    start = np.cumsum([0] + [len(thing.mesh.faces) for thing in things])
+    caster = Caster(join([obj.mesh for obj in objs]))
+    start = np.cumsum([0] + [len(obj.mesh.faces) for obj in objs])
     faces, densities = zip(*(_look(caster, camera) for camera in cameras), strict=True)
     face, density = np.concatenate(faces), np.concatenate(densities)
     number = np.searchsorted(start, face, side="right") - 1
-    index = np.array([thing.object_index for thing in things], np.uint16)
+    index = np.array([obj.object_index for obj in objs], np.uint16)
     return Closeness(index[number], (face - start[number]).astype(np.int32), density.astype(np.float32))
 
 

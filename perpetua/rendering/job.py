@@ -74,14 +74,14 @@ def write_job(
         shutil.rmtree(folder / FRAME_FOLDER, ignore_errors=True)
         (folder / EXPOSURE_FILE).unlink(missing_ok=True)
     blend_path = None if room.blend_path is None else str(room.blend_path.resolve())
-    share = machine_share()
+    fraction = machine_share()
     job |= {
         "digest": digest,
         "blend_path": blend_path,
         "device": device,
-        "threads": cpu_threads(config.threads, share),
-        "worker": share.worker,
-        "workers": share.workers,
+        "threads": cpu_threads(config.threads, fraction),
+        "worker": fraction.worker,
+        "workers": fraction.workers,
     }
     write_json(path, job)
     return path
@@ -118,21 +118,21 @@ def _room_settings(room: Room, writer: _ArrayWriter) -> Settings:
     if room.blend_path is not None:
         return {"blend_sha256": file_sha256(room.blend_path)}
     return {
-        "objects": [_object_settings(thing, writer) for thing in room.objects],
+        "objects": [_object_settings(obj, writer) for obj in room.objects],
         "lights": [_light_settings(light) for light in room.lights],
         "sky": None if room.sky is None else dataclasses.asdict(room.sky),
     }
 
 
-def _object_settings(thing: SceneObject, writer: _ArrayWriter) -> Settings:
-    if thing.material is None:
-        raise ValueError(f"object '{thing.name}' has no material, and the room has no .blend that holds one")
+def _object_settings(obj: SceneObject, writer: _ArrayWriter) -> Settings:
+    if obj.material is None:
+        raise ValueError(f"object '{obj.name}' has no material, and the room has no .blend that holds one")
     return {
-        "name": thing.name,
-        "object_index": thing.object_index,
-        "vertices_m": writer.write("vertices_m", thing.mesh.vertices_m.astype(np.float32)),
-        "faces": writer.write("faces", thing.mesh.faces),
-        "material": _material_settings(thing.material, writer),
+        "name": obj.name,
+        "object_index": obj.object_index,
+        "vertices_m": writer.write("vertices_m", obj.mesh.vertices_m.astype(np.float32)),
+        "faces": writer.write("faces", obj.mesh.faces),
+        "material": _material_settings(obj.material, writer),
     }
 
 

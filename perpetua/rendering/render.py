@@ -99,7 +99,7 @@ def _check_job(room: Room, actors: tuple[ActorMesh, ...], cameras: tuple[CameraP
     for name, length in lengths.items():
         if length != frame_count:
             raise RenderError(f"all cameras and actors must have {frame_count} frames; {name} has {length}")
-    taken = [thing.object_index for thing in room.objects] + [actor.object_index for actor in actors]
+    taken = [obj.object_index for obj in room.objects] + [actor.object_index for actor in actors]
     if len(set(taken)) != len(taken) or min(taken) < 1 or max(taken) > MAX_OBJECT_INDEX:
         raise RenderError(f"object indices must be unique and from 1 to {MAX_OBJECT_INDEX}; these are not: {taken}")
     return frame_count

@@ -14,7 +14,7 @@ class Bar:
 
     label: str
     count: int
-    share: float
+    fraction: float
     length: float
 
 
@@ -65,9 +65,9 @@ def named(title: str, note: str, counts: dict[str, int], most: int = 16) -> Char
     return Chart(title, note, _bars([name for name, _ in shown], np.array([count for _, count in shown])), rows=True)
 
 
-def shares(title: str, note: str, values: dict[str, float]) -> Chart:
+def fractions(title: str, note: str, values: dict[str, float]) -> Chart:
     """A row for each name, as long as its share of 1."""
-    bars = tuple(Bar(name, 0, share, share) for name, share in values.items())
+    bars = tuple(Bar(name, 0, fraction, fraction) for name, fraction in values.items())
     return Chart(title, note, bars, rows=True)
 
 

@@ -10,7 +10,7 @@ from statistics import mean, median
 import numpy as np
 
 from perpetua.report import scales
-from perpetua.report.charts import Chart, histogram, named, shares, tally
+from perpetua.report.charts import Chart, fractions, histogram, named, tally
 from perpetua.report.gather import SequenceFigures
 from perpetua.report.measure import Measured
 from perpetua.report.records import CheckRecord
@@ -47,7 +47,7 @@ class StageRow:
     longest_s: float
     most_memory_mb: float
     sequences: int
-    share: float
+    fraction: float
 
 
 def compare(figures: list[SequenceFigures]) -> list[Comparison]:
@@ -58,7 +58,7 @@ def compare(figures: list[SequenceFigures]) -> list[Comparison]:
     depths_m = [metres for one in good for metres in one.depth_m if math.isfinite(metres)]
     return [
         Comparison("scenes", "21", f"{len(good):,}"),
-        Comparison("views of a scene", "4", _range([len(one.visible_share) for one in good])),
+        Comparison("views of a scene", "4", _range([len(one.visible_fraction) for one in good])),
         Comparison("frames", "240", _range([one.frames for one in good])),
         Comparison("longer side of the image, px", "512", _range([max(one.size_px) for one in good])),
         Comparison("tracks of a scene", "1,024", _range([one.tracks for one in good])),
@@ -89,7 +89,7 @@ def charts(figures: list[SequenceFigures]) -> list[Chart]:
     good = _measured(figures)
     drawn = _counted_charts(reduce(add, [one.counts for one in good])) if good else []
     drawn += [_heights_chart(figures), *_named_charts(figures, good)]
-    return [chart for chart in drawn if chart.bars and (chart.total or any(bar.share for bar in chart.bars))]
+    return [chart for chart in drawn if chart.bars and (chart.total or any(bar.fraction for bar in chart.bars))]
 
 
 def _heights_chart(figures: list[SequenceFigures]) -> Chart:
@@ -106,7 +106,7 @@ def _counted_charts(counts: scales.Counts) -> list[Chart]:
                   counts.speed, scales.SPEED_MPS, "m/s"),
         tally("Views that see a track", "each track at each frame", counts.seeing_views, "views"),
         histogram("How long tracks are seen", "share of the frames in which any view sees a track",
-                  counts.seen_share, scales.SEEN_SHARE, "of the frames"),
+                  counts.seen_fraction, scales.SEEN_FRACTION, "of the frames"),
         tally("Occlusions", "how often a track is hidden while on the image; tracks by views that see them",
               counts.occlusions, "times"),
         histogram("Depth", "m, pixels with a surface", counts.depth, scales.DEPTH_M, "m"),
@@ -120,13 +120,13 @@ def _counted_charts(counts: scales.Counts) -> list[Chart]:
 def _named_charts(figures: list[SequenceFigures], good: list[Measured]) -> list[Chart]:
     by_view: dict[str, list[float]] = defaultdict(list)
     for one in good:
-        for view, share in enumerate(one.visible_share):
-            by_view[f"view {view}"].append(share)
+        for view, fraction in enumerate(one.visible_fraction):
+            by_view[f"view {view}"].append(fraction)
     seen = {view: mean(values) for view, values in by_view.items()}
     clothes = Counter(garment for one in figures for garment in one.garments)
     kinds = Counter(one.record.room_kind for one in figures if one.record.room_kind)
     return [
-        shares("Visible in each view", "share of tracks and frames that a view sees", seen),
+        fractions("Visible in each view", "share of tracks and frames that a view sees", seen),
         named("Clothes", "pieces worn, by people", clothes),
         named("Rooms", "sequences by kind of room", kinds),
     ]

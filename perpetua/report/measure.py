@@ -22,9 +22,9 @@ PIXEL_STEP = 4
 class Measured:
     """Sizes, shares and counts.
 
-    ``moving`` and ``fast`` count tracks. ``visible_share`` has one entry per view: the share of tracks and frames that
-    it sees. ``origin_m`` is the range of the cameras' distances from the world's origin, ``depth_m`` that of sampled
-    depths, NaN where there are none.
+    ``moving`` and ``fast`` count tracks. ``visible_fraction`` has one entry per view: the fraction of tracks and
+    frames that it sees. ``origin_m`` is the range of the cameras' distances from the world's origin, ``depth_m``
+    that of sampled depths, NaN where there are none.
     """
 
     frames: int
@@ -33,7 +33,7 @@ class Measured:
     counts: Counts
     moving: int
     fast: int
-    visible_share: tuple[float, ...]
+    visible_fraction: tuple[float, ...]
     origin_m: tuple[float, float]
     depth_m: tuple[float, float]
 
@@ -56,7 +56,7 @@ def measure(sequence: Sequence, fps: float) -> Measured:
         counts=_counts(sequence, sizes_px, reach_m, depth_m, fps),
         moving=int((reach_m > MOVING_M).sum()),
         fast=int(is_fast(tracks_m, reach_m).sum()),
-        visible_share=tuple(float(view.visible.mean()) if view.visible.size else 0.0 for view in sequence.views),
+        visible_fraction=tuple(float(view.visible.mean()) if view.visible.size else 0.0 for view in sequence.views),
         origin_m=(float(distance_m.min()), float(distance_m.max())),
         depth_m=(float(depth_m.min()), float(depth_m.max())) if len(depth_m) else (math.nan, math.nan),
     )
@@ -99,7 +99,7 @@ def _counts(
         travel=binned(reach_m, scales.TRAVEL_M),
         speed=binned(fps * np.linalg.norm(np.diff(moving_m, axis=0), axis=2), scales.SPEED_MPS),
         seeing_views=counted(visible.sum(axis=0), scales.MOST_VIEWS),
-        seen_share=binned(visible.any(axis=0).mean(axis=0), scales.SEEN_SHARE),
+        seen_fraction=binned(visible.any(axis=0).mean(axis=0), scales.SEEN_FRACTION),
         occlusions=_occlusions(sequence, visible, sizes_px),
         depth=binned(depth_m, scales.DEPTH_M),
         field_of_view=binned(np.array(fields_deg), scales.FIELD_OF_VIEW_DEG),

@@ -37,7 +37,7 @@ class SequenceRecord(Lenient):
     @property
     def people(self) -> tuple[str, ...]:
         """Descriptions of the people."""
-        return tuple(thing.description for thing in self.objects if thing.category == PERSON)
+        return tuple(obj.description for obj in self.objects if obj.category == PERSON)
 
 
 class CheckRecord(Lenient):

@@ -9,7 +9,7 @@ INFINITE = float("inf")
 # Edges of the bins; a value on an edge belongs to the bin above it. The last bin is open where it ends in infinity.
 TRAVEL_M = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0, INFINITE)
 SPEED_MPS = (0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, INFINITE)
-SEEN_SHARE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+SEEN_FRACTION = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 DEPTH_M = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, INFINITE)
 FIELD_OF_VIEW_DEG = (20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0, 110.0, 120.0)
 APART_DEG = (0.0, 20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0, 160.0, 180.0)
@@ -24,8 +24,9 @@ class Counts:
     """How often each bin occurs.
 
     ``travel``: tracks by how far they get from where they were first. ``speed``: moving tracks at each frame.
-    ``seeing_views``: tracks at each frame by how many views see them. ``seen_share``: tracks by the share of frames in
-    which a view sees them. ``occlusions``: tracks in each view that sees them, by how often they become hidden there.
+    ``seeing_views``: tracks at each frame by how many views see them. ``seen_fraction``: tracks by the fraction of
+    frames in which a view sees them. ``occlusions``: tracks in each view that sees them, by how often they are
+    hidden there.
     ``depth``: pixels with a surface, a sample. ``field_of_view``: views, across the image. ``apart``: pairs of views
     at a sample of frames, by the angle between their optical axes.
     """
@@ -33,7 +34,7 @@ class Counts:
     travel: Int64[np.ndarray, " _"]
     speed: Int64[np.ndarray, " _"]
     seeing_views: Int64[np.ndarray, " _"]
-    seen_share: Int64[np.ndarray, " _"]
+    seen_fraction: Int64[np.ndarray, " _"]
     occlusions: Int64[np.ndarray, " _"]
     depth: Int64[np.ndarray, " _"]
     field_of_view: Int64[np.ndarray, " _"]

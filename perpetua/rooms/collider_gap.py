@@ -34,11 +34,11 @@ class ColliderGap:
 
 def collider_gap(room: Room, colliders: TriMesh) -> ColliderGap:
     """Compares the rendered surface of a room with its collision meshes."""
-    points_m = _spread(join([thing.mesh for thing in room.objects]), SAMPLES)
+    points_m = _spread(join([obj.mesh for obj in room.objects]), SAMPLES)
     distance_m = Caster(colliders).closest_distance(points_m[_inside(points_m, room)], LIMIT_M)
     median_m, p95_m, p99_m = (round(float(value), 5) for value in np.quantile(distance_m, (0.5, 0.95, 0.99)))
-    share = round(float((distance_m > FAR_M).mean()), 5)
-    return ColliderGap(median_m, p95_m, p99_m, round(float(distance_m.max()), 5), share)
+    fraction = round(float((distance_m > FAR_M).mean()), 5)
+    return ColliderGap(median_m, p95_m, p99_m, round(float(distance_m.max()), 5), fraction)
 
 
 def _inside(points_m: Float64[np.ndarray, "N 3"], room: Room) -> Bool[np.ndarray, " N"]:

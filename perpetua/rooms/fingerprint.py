@@ -11,16 +11,16 @@ def room_sha256(room: Room) -> str:
     """SHA-256 over the outline and every object's index, name, category, flags and world mesh, bit by bit."""
     digest = hashlib.sha256(f"{room.kind} {room.height_m!r}".encode())
     digest.update(np.ascontiguousarray(room.floor_polygon_m).tobytes())
-    for thing in room.objects:
+    for obj in room.objects:
         said = (
-            thing.object_index,
-            thing.name,
-            thing.category,
-            thing.walkable,
-            thing.opaque,
-            len(thing.mesh.vertices_m),
+            obj.object_index,
+            obj.name,
+            obj.category,
+            obj.walkable,
+            obj.opaque,
+            len(obj.mesh.vertices_m),
         )
         digest.update(repr(said).encode())
-        digest.update(np.ascontiguousarray(thing.mesh.vertices_m).tobytes())
-        digest.update(np.ascontiguousarray(thing.mesh.faces).tobytes())
+        digest.update(np.ascontiguousarray(obj.mesh.vertices_m).tobytes())
+        digest.update(np.ascontiguousarray(obj.mesh.faces).tobytes())
     return digest.hexdigest()

@@ -24,7 +24,7 @@ from perpetua.seeding import StageSeed
 SCRIPT = SCRIPT_FOLDER / "infinigen" / "infinigen_room.py"
 # How far Infinigen's colliders are from what is rendered, beside the room.
 COLLIDER_GAP_FILE = "collider_gap.json"
-# Infinigen furnishes a bathroom with few things: at full size most of it would be empty floor.
+# Infinigen furnishes a bathroom with few objects: at full size most of it would be empty floor.
 SIDE_SCALE: dict[RoomKind, float] = {"bathroom": 0.8}
 
 

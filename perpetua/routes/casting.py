@@ -40,7 +40,9 @@ class _Line:
         return cls(words, stated_paces(words), wants_seat(words))
 
 
-def cast_actors(count: int, config: MotionConfig, shares: PaceShares, seats: int, seed: StageSeed) -> tuple[Role, ...]:
+def cast_actors(
+    count: int, config: MotionConfig, fractions: PaceShares, seats: int, seed: StageSeed
+) -> tuple[Role, ...]:
     """A role for each actor, no two alike while the list lasts.
 
     Each actor draws a pace by its share, then the next description of a shuffled list that states this pace, or none;
@@ -49,7 +51,7 @@ def cast_actors(count: int, config: MotionConfig, shares: PaceShares, seats: int
     Args:
         count: number of actors.
         config: where descriptions come from.
-        shares: how often each pace is drawn.
+        fractions: how often each pace is drawn.
         seats: how many actors can sit down in the room; no more get descriptions that ask for a seat.
         seed: all randomness comes from ``seed.stream("actions")`` and ``seed.stream("pace", actor)``.
 
@@ -62,7 +64,7 @@ def cast_actors(count: int, config: MotionConfig, shares: PaceShares, seats: int
     roles: list[Role] = []
     for actor in range(count):
         waiting = waiting or [lines[index] for index in order]
-        pace = _draw_pace(shares, seed, actor)
+        pace = _draw_pace(fractions, seed, actor)
         free_seats = seats - sum(role.sits for role in roles)
         line = waiting[0] if config.descriptions else _choose(waiting, pace, free_seats)
         waiting.remove(line)
@@ -73,8 +75,8 @@ def cast_actors(count: int, config: MotionConfig, shares: PaceShares, seats: int
     return tuple(roles)
 
 
-def _draw_pace(shares: PaceShares, seed: StageSeed, actor: int) -> str:
-    weights = [getattr(shares, pace) for pace in PACES]
+def _draw_pace(fractions: PaceShares, seed: StageSeed, actor: int) -> str:
+    weights = [getattr(fractions, pace) for pace in PACES]
     drawn = seed.stream("pace", actor).choice(len(PACES), p=[weight / sum(weights) for weight in weights])
     return PACES[int(drawn)]
 

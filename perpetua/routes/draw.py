@@ -23,7 +23,7 @@ BEFORE_SEAT_M = 0.45
 SEAT_TOLERANCE_M = 0.25
 BETWEEN_SITTERS_M = 1.0
 # Of the paces of a role without stated paces, neighbours are gone at for this share of the legs.
-CHANGE_SHARE = 0.3
+CHANGE_FRACTION = 0.3
 # Someone who walks and stands pauses so much more.
 STANDING_FACTOR = 2.0
 MOVING_PACES = ("stroll", "walk", "brisk", "jog")
@@ -90,16 +90,16 @@ def _manner(stage: Stage, role: Role, config: RoutesConfig, others: list[Walk]) 
     paces = [pace for pace in role.paces if pace != "stand"]
     if not paces and seats:
         paces = ["stroll"]
-    shares = [1.0] * len(paces)
+    fractions = [1.0] * len(paces)
     if len(paces) == 1 and paces[0] != "jog":
         place = MOVING_PACES.index(paces[0])
         # Nobody breaks into a run on the way.
         neighbours = [MOVING_PACES[near] for near in (place - 1, place + 1) if 0 <= near < len(MOVING_PACES) - 1]
-        shares = [1.0 - CHANGE_SHARE] + [CHANGE_SHARE / len(neighbours)] * len(neighbours)
+        fractions = [1.0 - CHANGE_FRACTION] + [CHANGE_FRACTION / len(neighbours)] * len(neighbours)
         paces += neighbours
     factor = STANDING_FACTOR if "stand" in role.paces else 1.0
     speeds_mps = tuple(_speed_mps(pace, config) for pace in paces)
-    return Manner(speeds_mps, tuple(shares), min(0.9, factor * config.pause_share), seats)
+    return Manner(speeds_mps, tuple(fractions), min(0.9, factor * config.pause_share), seats)
 
 
 def _start(
@@ -133,5 +133,5 @@ def _slowness(walk: Walk, manner: Manner, step_s: float) -> float:
     if not manner.speeds_mps:
         return 0.0
     travelled_m = float(np.linalg.norm(np.diff(walk.position_m, axis=0), axis=1).sum())
-    wished_mps = float(np.average(manner.speeds_mps, weights=manner.shares)) * (1.0 - manner.pause_share)
+    wished_mps = float(np.average(manner.speeds_mps, weights=manner.fractions)) * (1.0 - manner.pause_share)
     return max(0.0, 1.0 - travelled_m / (wished_mps * step_s * len(walk.position_m)))

@@ -35,13 +35,13 @@ def _nearest_object(room: Room, place_m: tuple[float, float]) -> str:
     """The name of what is nearest to a body's middle at this place."""
     waist_m = np.array([[*place_m, 1.0]])
     nearest_m, name = math.inf, "the edge of the floor"
-    for thing in room.objects:
-        if thing.walkable or not len(thing.mesh.faces):
+    for obj in room.objects:
+        if obj.walkable or not len(obj.mesh.faces):
             continue
-        triangles = thing.mesh.vertices_m[thing.mesh.faces]
+        triangles = obj.mesh.vertices_m[obj.mesh.faces]
         closest = trimesh.triangles.closest_point(triangles, np.repeat(waist_m, len(triangles), axis=0))
         # Across the floor, since a body stands from floor to head.
         distance_m = float(np.linalg.norm(closest[:, :2] - waist_m[:, :2], axis=1).min())
         if distance_m < nearest_m and closest[:, 2].min() < 2.0:
-            nearest_m, name = distance_m, thing.name
+            nearest_m, name = distance_m, obj.name
     return name

@@ -20,8 +20,8 @@ from perpetua.routes.config import RoutesConfig
 CLEARANCE_MARGIN_M = 0.05
 SEPARATION_MARGIN_M = 0.1
 # People seldom go to these shares of the hard limits.
-ACCELERATION_SHARE, TURN_SHARE = 0.45, 0.4
-SPEED_SHARE = 0.92
+ACCELERATION_FRACTION, TURN_FRACTION = 0.45, 0.4
+SPEED_FRACTION = 0.92
 # Nobody goes much faster than the fastest of its paces.
 PACE_EXCESS = 1.15
 # A shift of a path is a sum of bells of this width over time, so that neighbours move together and stay smooth.
@@ -95,9 +95,9 @@ def weighted_losses(
     """Each loss times its weight."""
     walks, step_s = plan.walks, plan.walks.step_s
     start_m, start_rad = torch.from_numpy(walks.position_m), torch.from_numpy(walks.heading_rad)
-    limit_mps = torch.from_numpy(np.minimum(plan.highest_mps, SPEED_SHARE * config.max_speed_mps))
-    acceleration_mps2 = ACCELERATION_SHARE * config.max_acceleration_mps2
-    turn_rate_radps = TURN_SHARE * config.max_turn_rate_radps
+    limit_mps = torch.from_numpy(np.minimum(plan.highest_mps, SPEED_FRACTION * config.max_speed_mps))
+    acceleration_mps2 = ACCELERATION_FRACTION * config.max_acceleration_mps2
+    turn_rate_radps = TURN_FRACTION * config.max_turn_rate_radps
     pausing = torch.from_numpy(plan.pausing.astype(np.float64))
     terms = {
         "clearance": losses.clearance_loss(field.at(position_m), field.wanted_m),
@@ -148,8 +148,8 @@ def _own_clock(walks: TimedPaths) -> Float64[np.ndarray, "A T"]:
         moves = np.linalg.norm(np.diff(position_m, axis=0), axis=1) > STILL_MPS * walks.step_s
         stands = ~(np.append(False, moves) | np.append(moves, False))
         away_s = ndimage.distance_transform_edt(~stands) * walks.step_s if stands.any() else np.full(len(row), np.inf)
-        share = np.clip((away_s - walks.step_s) / SLOWING_S, 0.0, 1.0)
-        rate = share**2 * (3.0 - 2.0 * share)
+        fraction = np.clip((away_s - walks.step_s) / SLOWING_S, 0.0, 1.0)
+        rate = fraction**2 * (3.0 - 2.0 * fraction)
         row[:] = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1])))
     return clock
 

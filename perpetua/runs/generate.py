@@ -18,7 +18,7 @@ from perpetua.machine.devices import auto_workers
 from perpetua.machine.free_memory import free_memory_mb
 from perpetua.machine.system_libraries import require_libraries
 from perpetua.pipeline.cost import (
-    TIGHT_SHARE,
+    TIGHT_FRACTION,
     Cost,
     check_disk,
     estimate_cost,
@@ -169,7 +169,7 @@ def _say_cost(request: GenerateRequest, cost: Cost, free_bytes: float, until: st
         f"{gigabytes(cost.busy_bytes)} while it is made; {gigabytes(cost.total_bytes)} for {cost.rooms} room(s) that "
         f"are not there yet; {gigabytes(free_bytes)} free"
     )
-    if cost.total_bytes > TIGHT_SHARE * free_bytes:
+    if cost.total_bytes > TIGHT_FRACTION * free_bytes:
         say("warning: that is tight; --set work.keep=none keeps nothing of the work behind finished sequences")
     say(f"writes to: {request.out.absolute()}")
 

@@ -199,9 +199,9 @@ def studio() -> Room:
     wall = floor[[0, 3]][[0, 1, 1, 0]] + [[0, 0, 0], [0, 0, 0], [0, 0, 12.0], [0, 0, 12.0]]
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
     grey = Material("studio", (0.32, 0.32, 0.33), roughness=0.9)
-    things = (
+    objs = (
         SceneObject(1, "floor", "floor", TriMesh(floor, faces), grey, True, True),
         SceneObject(2, "wall", "wall", TriMesh(wall, faces), grey, False, True),
     )
     lamp = AreaLight((9.0, -7.0, 10.0), (-0.63, 0.45, -0.63), (3.0, 3.0), 9000.0, (1.0, 0.84, 0.66))
-    return Room("studio", "studio", floor[:, :2], 12.0, things, (lamp,), None)
+    return Room("studio", "studio", floor[:, :2], 12.0, objs, (lamp,), None)

@@ -122,7 +122,7 @@ def _light(room_folder: Path) -> str:
 def describe_room(title: str, room: Room, grid: NavGrid, light: str) -> RoomCard:
     """The figures of a room; ``light`` says what lights it."""
     x_m, y_m = np.ptp(room.floor_polygon_m, axis=0)
-    triangles = sum(len(thing.mesh.faces) for thing in room.objects)
+    triangles = sum(len(obj.mesh.faces) for obj in room.objects)
     facts = [
         f"{x_m:.1f} x {y_m:.1f} x {room.height_m:.1f} m",
         f"{len(room.objects)} objects",

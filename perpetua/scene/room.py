@@ -58,7 +58,7 @@ class Sky:
 
 @dataclass(frozen=True)
 class SceneObject:
-    """One rendered thing of a room, exactly as rendered.
+    """One rendered object of a room, exactly as rendered.
 
     ``mesh`` is in world coordinates; in a .blend the object with this ``object_index`` as pass index has the same
     triangles. ``material`` is None where the room's .blend carries it. ``walkable``: a person may stand on its
@@ -93,4 +93,4 @@ class Room:
     @property
     def next_object_index(self) -> int:
         """The first object index that the room leaves free."""
-        return max(thing.object_index for thing in self.objects) + 1
+        return max(obj.object_index for obj in self.objects) + 1

@@ -35,16 +35,16 @@ class StaticSurfaces:
 
     def __init__(self, meshes: SceneMeshes, cameras: tuple[CameraPath, ...], views: tuple[RenderedView, ...]) -> None:
         self.meshes, self.cameras, self.views = meshes, cameras, views
-        self.thing = np.array(sorted(meshes.static), np.int64)
-        parts = [meshes.static[index] for index in self.thing.tolist()]
+        self.obj = np.array(sorted(meshes.static), np.int64)
+        parts = [meshes.static[index] for index in self.obj.tolist()]
         self.caster = Caster(join(parts))
         self.first_face = np.cumsum([0] + [len(part.faces) for part in parts])
 
     def draw(self, count: int, rng: np.random.Generator) -> SurfacePoints:
         """About ``count`` points, spread evenly over views and times, and in each image over objects."""
         images = [(view, frame) for view in range(len(self.views)) for frame in self._frames(rng)]
-        share = -(-count // len(images))
-        rays = [self._rays(view, frame, share, rng) for view, frame in images]
+        fraction = -(-count // len(images))
+        rays = [self._rays(view, frame, fraction, rng) for view, frame in images]
         origin_m = np.concatenate([ray.origin_m for ray in rays])
         direction = np.concatenate([ray.direction for ray in rays])
         shown = np.concatenate([ray.object_index for ray in rays])
@@ -59,7 +59,7 @@ class StaticSurfaces:
 
     def _rays(self, view: int, frame: int, count: int, rng: np.random.Generator) -> PixelRays:
         shown = np.asarray(self.views[view].object_index[frame]).reshape(-1)
-        pixel = np.flatnonzero(np.isin(shown, self.thing))
+        pixel = np.flatnonzero(np.isin(shown, self.obj))
         if len(pixel) == 0:
             return PixelRays(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64))
         pixels_of = np.bincount(shown[pixel])
@@ -83,7 +83,7 @@ class StaticSurfaces:
         hits = self.caster.first_hit(origin_m, direction)
         place = np.searchsorted(self.first_face, hits.face, side="right") - 1
         found = np.flatnonzero(hits.hit)
-        found = found[self.thing[place[found]] == shown[found]]
+        found = found[self.obj[place[found]] == shown[found]]
         joined = self.caster.mesh
         corner_m = joined.vertices_m[joined.faces[hits.face[found]]]
         weight = plane_barycentric(_plane_point(origin_m[found], direction[found], corner_m), corner_m)
@@ -112,12 +112,12 @@ class ActorSurfaces:
 
     def draw(self, count: int, rng: np.random.Generator) -> SurfacePoints:
         """About ``count`` points."""
-        share = -(-count // len(self.actors))
+        fraction = -(-count // len(self.actors))
         groups = []
         for actor, weight in zip(self.actors, self.weight, strict=True):
-            face = np.searchsorted(weight, rng.random(share) * weight[-1], side="right")
+            face = np.searchsorted(weight, rng.random(fraction) * weight[-1], side="right")
             face = np.minimum(face, len(weight) - 1).astype(np.int32)
-            groups.append(SurfacePoints(np.full(share, actor.object_index, np.int32), face, _inside(share, rng)))
+            groups.append(SurfacePoints(np.full(fraction, actor.object_index, np.int32), face, _inside(fraction, rng)))
         return join_points(groups)
 
 

@@ -28,7 +28,7 @@ def spread(
     """Chooses ``wanted`` candidates greedily, a batch at a time, best first.
 
     A candidate is worth more where few were chosen before: in the image cells it is seen in, and on its object.
-    An object's share grows with the root of its candidates, so that walls do not crowd out small things.
+    An object's share grows with the root of its candidates, so that walls do not crowd out small objects.
 
     Args:
         wanted: how many to choose, at most the number of candidates.
@@ -37,8 +37,8 @@ def spread(
         rng: breaks ties.
         reserved: candidates of which at least ``least`` are chosen, or all if they are fewer.
     """
-    _, thing, candidates_of = np.unique(object_index, return_inverse=True, return_counts=True)
-    thing, appetite = thing.reshape(-1), np.sqrt(candidates_of.astype(np.float64))
+    _, obj, candidates_of = np.unique(object_index, return_inverse=True, return_counts=True)
+    obj, appetite = obj.reshape(-1), np.sqrt(candidates_of.astype(np.float64))
     seen_in = np.maximum(np.asarray(cells.sum(axis=1)).reshape(-1), 1.0)
     in_cell, on_object = np.zeros(cells.shape[1]), np.zeros(len(appetite))
     chosen: list[Int64[np.ndarray, " B"]] = []
@@ -48,14 +48,14 @@ def spread(
     least = min(least, wanted, int((~closed).sum()))
     for size, only_reserved in [*_batches(least, wanted, True), *_batches(wanted - least, wanted, False)]:
         gain = cells @ (1.0 / (1.0 + in_cell)) / seen_in
-        gain += (appetite / (1.0 + on_object))[thing]
+        gain += (appetite / (1.0 + on_object))[obj]
         gain *= 1.0 + JITTER * rng.random(len(gain))
         gain[taken | (closed & only_reserved)] = -1.0
         best = np.argsort(-gain, kind="stable")[:size]
         chosen.append(best)
         taken[best] = True
         in_cell += np.asarray(cells[best].sum(axis=0)).reshape(-1)
-        on_object += np.bincount(thing[best], minlength=len(on_object))
+        on_object += np.bincount(obj[best], minlength=len(on_object))
     return np.concatenate([np.zeros(0, np.int64), *chosen])
 
 
@@ -83,8 +83,8 @@ def seen_cells(
         for place, time in enumerate(times.tolist()):
             seen = np.flatnonzero(visible[view, time])
             camera_m = transform_points(camera_from_world[frames[time]], position_m[place][seen])
-            share = (project(camera.intrinsics, camera_m) + 0.5) / size_px
-            cell = np.clip((share * IMAGE_CELLS).astype(np.int64), 0, IMAGE_CELLS - 1)
+            fraction = (project(camera.intrinsics, camera_m) + 0.5) / size_px
+            cell = np.clip((fraction * IMAGE_CELLS).astype(np.int64), 0, IMAGE_CELLS - 1)
             rows.append(seen)
             columns.append(((view * len(times) + place) * IMAGE_CELLS + cell[:, 1]) * IMAGE_CELLS + cell[:, 0])
     row, column = np.concatenate(rows), np.concatenate(columns)

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from perpetua.tracks.surface import SceneMeshes, SurfacePoints
 
 # Eyes, mouth, neck and hems leave holes in a body that is closed for every practical purpose.
-OPEN_EDGE_SHARE = 0.03
+OPEN_EDGE_FRACTION = 0.03
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def closed_sides(vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray
     """Finds connected surfaces that are closed, consistently wound, and face outwards.
 
     Vertices at one position count as one, because seams of textures split them. A surface is closed when at most
-    ``OPEN_EDGE_SHARE`` of its edges lack a partner of the opposite direction, and faces outwards when its signed
+    ``OPEN_EDGE_FRACTION`` of its edges lack a partner of the opposite direction, and faces outwards when its signed
     volume is positive.
     """
     corner = _vertex_at_one_position(vertices_m)[faces]
@@ -77,7 +77,7 @@ def closed_sides(vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray
     low_m, high_m = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low_m, surface, triangle_m.min(axis=1))
     np.maximum.at(high_m, surface, triangle_m.max(axis=1))
-    closed = outward & (open_edges <= OPEN_EDGE_SHARE * edges)
+    closed = outward & (open_edges <= OPEN_EDGE_FRACTION * edges)
     return ClosedSides(closed[surface], np.stack([low_m, high_m], axis=1)[surface])
 
 

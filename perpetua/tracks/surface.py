@@ -50,7 +50,7 @@ class SceneMeshes:
     def of(cls, room: Room, actors: tuple[ActorMesh, ...]) -> "SceneMeshes":
         """The meshes of a room and its actors."""
         return cls(
-            {thing.object_index: thing.mesh for thing in room.objects if thing.opaque},
+            {obj.object_index: obj.mesh for obj in room.objects if obj.opaque},
             {actor.object_index: actor.vertices_m for actor in actors},
             {actor.object_index: actor.faces for actor in actors},
         )

@@ -34,8 +34,8 @@ class SightReport:
 
     ``blocked_*``: the image shows the point's surface at a pixel around it, and the exact ray is stopped: by or on
     hair; by something less than 1 cm before the point (or the point is on the back of a closed surface); at a grazing
-    angle; by a thing so thin that no pixel around shows it; by an edge. ``unseen_*``: the ray reaches the point, and
-    no pixel around shows its surface: hair; a grazing angle; nothing of its object in any pixel around (thin things);
+    angle; by an object so thin that no pixel around shows it; by an edge. ``unseen_*``: the ray reaches the point, and
+    no pixel around shows its surface: hair; a grazing angle; nothing of its object in any pixel around (thin objects);
     only other parts of its object, just where the meshes have them (edges, and thin parts such as a rim); otherwise,
     which is a rendered surface that is not where the mesh is.
     """

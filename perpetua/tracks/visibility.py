@@ -4,12 +4,12 @@ Two witnesses are asked.
 
 - The image. Among the (up to) four pixel centres around the projection, one must show the point's object at the depth
   that the plane of the point's own triangle has along that pixel's ray; so a slanted surface needs no loose tolerance,
-  and points on edges and thin things are not lost. Where the object is shown but its surface bends away from that
+  and points on edges and thin objects are not lost. Where the object is shown but its surface bends away from that
   plane, the depth of the triangles near the point counts instead: those that the rays of the pixel centres meet
   within two pixels of it.
 - The ray from the camera to the point must meet nothing opaque before it. A point on the back of a closed surface is
   seen only where the ray meets its own triangle first, as through the opening of a sleeve; elsewhere its front hides
-  it, however thin the thing is.
+  it, however thin the object is.
 
 A point is visible where both say so. Where they differ it is hidden, and counted by the reason (``SightReport``).
 """
@@ -35,9 +35,9 @@ from perpetua.tracks.types import SightReport
 
 # A ray has reached its point this far before it. Which triangle it meets is known to single precision, how far that is
 # to double, so no more is needed than where two triangles meet at an edge.
-REACHED_M, REACHED_SHARE = 5e-5, 5e-6
+REACHED_M, REACHED_FRACTION = 5e-5, 5e-6
 # Rendered depth is what the meshes have along the ray when it is within this.
-SAME_DEPTH_M, SAME_DEPTH_SHARE = 1e-3, 1e-4
+SAME_DEPTH_M, SAME_DEPTH_FRACTION = 1e-3, 1e-4
 # What hides a point from closer than this lies on it: a shirt on skin, a rug on the floor.
 COINCIDENT_M = 0.01
 # Triangles within so many pixels of a point, measured along its surface, are its neighbours.
@@ -105,7 +105,7 @@ def visible_in_frame(
     height_m = points.planes.height_m(around.eye_m)
     cosine = np.abs(height_m) / np.maximum(length_m, 1e-30)
     own = (hits.object_index == points.object_index) & (hits.face == points.face)
-    reached = own | (hits.distance_m >= length_m * (1.0 - REACHED_SHARE) - REACHED_M)
+    reached = own | (hits.distance_m >= length_m * (1.0 - REACHED_FRACTION) - REACHED_M)
     turned = (height_m <= 0.0) & points.sides.hide_back(around.eye_m) & ~own
     reached &= ~turned
     agrees = (shows & _on_plane(points.planes, height_m, around, config)).any(axis=1)
@@ -155,7 +155,7 @@ def _on_neighbours(
     hits = sight.first_hit(frame, eye_m, direction)
     meshed_m = hits.distance_m / np.linalg.norm(direction, axis=1)
     rendered_m = around.depth_m[pair, corner]
-    same = np.abs(meshed_m - rendered_m) <= SAME_DEPTH_M + SAME_DEPTH_SHARE * rendered_m
+    same = np.abs(meshed_m - rendered_m) <= SAME_DEPTH_M + SAME_DEPTH_FRACTION * rendered_m
     same &= hits.object_index == around.shown[pair, corner]
     as_meshed = np.ones(len(chosen), bool)
     np.logical_and.at(as_meshed, member, same)

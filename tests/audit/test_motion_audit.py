@@ -119,8 +119,8 @@ def test_rules_for_people_catch_what_breaks_them() -> None:
     rest = walkers(FRAMES)[1:]
 
     def along(start: tuple[float, float], end: tuple[float, float]) -> list[str]:
-        share = np.linspace(0.0, 1.0, FRAMES)[:, None]
-        return _broken(_audit((walker(0, (1.0 - share) * np.array(start) + share * np.array(end)), *rest)))
+        fraction = np.linspace(0.0, 1.0, FRAMES)[:, None]
+        return _broken(_audit((walker(0, (1.0 - fraction) * np.array(start) + fraction * np.array(end)), *rest)))
 
     assert along((-2.2, -1.6), (-1.0, -1.2)) == []
     assert along((-2.8, -1.6), (-1.6, -1.2)) == ["route clearance"]

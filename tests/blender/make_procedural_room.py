@@ -97,9 +97,9 @@ def main() -> None:
     screen.materials[0] = screen_material()
     places = [(mesh, -2.1, 0.0), (mesh, 0.0, 0.0), (plain, 2.1, 0.0), (screen, 0.0, 2.1)]
     for index, (data, x, y) in enumerate(places, start=1):
-        thing = bpy.data.objects.new(f"board_{index}", data)
-        thing.location, thing.pass_index = (x, y, 0.0), index
-        scene.collection.objects.link(thing)
+        obj = bpy.data.objects.new(f"board_{index}", data)
+        obj.location, obj.pass_index = (x, y, 0.0), index
+        scene.collection.objects.link(obj)
     lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "AREA"))
     lamp.location, lamp.data.energy, lamp.data.size = (0.5, 0.3, 3.0), 300.0, 2.0
     scene.collection.objects.link(lamp)

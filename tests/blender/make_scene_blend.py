@@ -1,7 +1,7 @@
 """Writes a .blend as a stranger might: ``python make_scene_blend.py scene.blend trap.txt library``.
 
 Units are centimetres. It holds a room of 6 x 5 x 2.6 m, a table of a curve, a chair shown by collection instances, a
-hidden thing, a lamp, and code that would write ``trap.txt`` if it ran: a registered text, a driver and a compositor.
+hidden object, a lamp, and code that would write ``trap.txt`` if it ran: a registered text, a driver and a compositor.
 With "linked" for the last word, it links its chair from another file.
 """
 
@@ -23,9 +23,9 @@ def box(name: str, low: tuple[float, float, float], high: tuple[float, float, fl
     faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(corners, [], faces)
-    thing = bpy.data.objects.new(name, mesh)
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
+    obj = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
 
 
 def build_room() -> None:
@@ -100,8 +100,8 @@ def main() -> None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         with bpy.data.libraries.load(str(library), link=True) as (source, target):
             target.objects = list(source.objects)
-        for thing in target.objects:
-            bpy.context.scene.collection.objects.link(thing)
+        for obj in target.objects:
+            bpy.context.scene.collection.objects.link(obj)
     units = bpy.context.scene.unit_settings
     units.system, units.scale_length = "METRIC", 0.01
     build_room()

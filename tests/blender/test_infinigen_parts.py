@@ -173,7 +173,7 @@ def answer() -> dict[str, Any]:
     return content
 
 
-def test_things_settle_on_what_is_below_them(answer: dict[str, Any]) -> None:
+def test_objects_settle_on_what_is_below_them(answer: dict[str, Any]) -> None:
     moved = answer["settled"]["moved"]
     assert moved["table"] == pytest.approx(-0.05, abs=1e-4)
     # The cup was 1 cm above the table, and follows it down.
@@ -189,7 +189,7 @@ def test_ceiling_lamps_are_lifted_to_the_ceiling(answer: dict[str, Any]) -> None
     assert moved["held"] == 0.0
 
 
-def test_small_things_in_the_air_are_left_out_with_what_stands_on_them(answer: dict[str, Any]) -> None:
+def test_small_objects_in_the_air_are_left_out_with_what_stands_on_them(answer: dict[str, Any]) -> None:
     assert answer["settled"]["gone"] == ["books", "vase"]
 
 

@@ -93,37 +93,37 @@ def test_the_room_is_acceptable_and_origin_is_on_its_floor(rooms: tuple[Room, Ro
     room = rooms[0]
     check_room(room, CONFIG, NavigationConfig())
     assert build_nav_grid(room, NavigationConfig()).free_floor_m2 >= CONFIG.min_free_floor_m2
-    floor = next(thing for thing in room.objects if thing.category == "floor")
+    floor = next(obj for obj in room.objects if obj.category == "floor")
     np.testing.assert_allclose(floor.mesh.vertices_m[:, 2], 0.0, atol=1e-6)
     low, high = floor.mesh.vertices_m.min(0), floor.mesh.vertices_m.max(0)
     np.testing.assert_allclose(low[:2], -high[:2], atol=1e-4)
     np.testing.assert_allclose(high[:2], room.floor_polygon_m.max(0), atol=1e-3)
     # Shafts of skylights rise above the ceiling.
-    ceiling_m = min(thing.mesh.vertices_m[:, 2].min() for thing in room.objects if thing.category == "ceiling")
+    ceiling_m = min(obj.mesh.vertices_m[:, 2].min() for obj in room.objects if obj.category == "ceiling")
     assert abs(ceiling_m - room.height_m) < 0.05
 
 
 def test_names_are_plain_nouns_with_a_number(rooms: tuple[Room, Room]) -> None:
-    names = [thing.name for thing in rooms[0].objects]
+    names = [obj.name for obj in rooms[0].objects]
     assert len(set(names)) == len(names) and "floor_0" in names
-    assert all(re.fullmatch(rf"{thing.category}_\d+", thing.name) for thing in rooms[0].objects)
+    assert all(re.fullmatch(rf"{obj.category}_\d+", obj.name) for obj in rooms[0].objects)
 
 
 def test_triangles_are_those_that_the_blend_renders(rooms: tuple[Room, Room], blend: dict[str, Any]) -> None:
-    things = blend["things"]
-    assert sorted(int(index) for index in things) == [thing.object_index for thing in rooms[0].objects]
-    for thing in rooms[0].objects:
-        rendered = things[str(thing.object_index)]
-        assert rendered["triangles"] == len(thing.mesh.faces), thing.name
-        corners_m = thing.mesh.vertices_m[thing.mesh.faces].reshape(-1, 3)
-        np.testing.assert_allclose(rendered["centre"], corners_m.mean(0), atol=1e-5, err_msg=thing.name)
-        np.testing.assert_allclose(rendered["low"], corners_m.min(0), atol=1e-5, err_msg=thing.name)
-        np.testing.assert_allclose(rendered["high"], corners_m.max(0), atol=1e-5, err_msg=thing.name)
+    objs = blend["things"]
+    assert sorted(int(index) for index in objs) == [obj.object_index for obj in rooms[0].objects]
+    for obj in rooms[0].objects:
+        rendered = objs[str(obj.object_index)]
+        assert rendered["triangles"] == len(obj.mesh.faces), obj.name
+        corners_m = obj.mesh.vertices_m[obj.mesh.faces].reshape(-1, 3)
+        np.testing.assert_allclose(rendered["centre"], corners_m.mean(0), atol=1e-5, err_msg=obj.name)
+        np.testing.assert_allclose(rendered["low"], corners_m.min(0), atol=1e-5, err_msg=obj.name)
+        np.testing.assert_allclose(rendered["high"], corners_m.max(0), atol=1e-5, err_msg=obj.name)
 
 
 def test_the_blend_is_plain_and_complete(blend: dict[str, Any]) -> None:
-    for thing in blend["things"].values():
-        assert (thing["modifiers"], thing["particles"], thing["hidden"], thing["parent"]) == (0, 0, False, False)
+    for obj in blend["things"].values():
+        assert (obj["modifiers"], obj["particles"], obj["hidden"], obj["parent"]) == (0, 0, False, False)
     assert blend["other"] == []
     assert blend["displacement"] == ["BUMP"]
     assert (blend["unpacked"], blend["libraries"], blend["drivers"]) == ([], 0, 0)
@@ -137,7 +137,7 @@ def test_no_surface_lets_a_camera_ray_through(blend: dict[str, Any]) -> None:
 
 def test_the_outline_runs_along_the_walls(rooms: tuple[Room, Room]) -> None:
     room = rooms[0]
-    walls = Caster(join([thing.mesh for thing in room.objects if thing.category == "wall"]))
+    walls = Caster(join([obj.mesh for obj in room.objects if obj.category == "wall"]))
     corners_m = np.column_stack([room.floor_polygon_m, np.full(len(room.floor_polygon_m), 0.05)])
     assert walls.closest_distance(corners_m).max() < 0.01
     # The middle of each side too, unless a door or a window reaches the floor there.

@@ -75,18 +75,18 @@ def test_every_format_gives_the_room_that_was_written(tmp_path: Path, suffix: st
     room = _make(write_scene(original, tmp_path / f"scene{suffix}", Y_UP_FROM_Z_UP @ moved), tmp_path / "work")
     assert room.kind == "scene"
     assert room.height_m == pytest.approx(original.height_m, abs=0.05)
-    assert [thing.object_index for thing in room.objects] == list(range(1, len(original.objects) + 1))
-    whole, wanted = ([thing.mesh for thing in made.objects] for made in (room, original))
+    assert [obj.object_index for obj in room.objects] == list(range(1, len(original.objects) + 1))
+    whole, wanted = ([obj.mesh for obj in made.objects] for made in (room, original))
     assert sum(len(mesh.faces) for mesh in whole) == sum(len(mesh.faces) for mesh in wanted)
-    floor_m = next(thing.mesh for thing in original.objects if thing.category == "floor").vertices_m
+    floor_m = next(obj.mesh for obj in original.objects if obj.category == "floor").vertices_m
     shift_m = np.append(0.5 * (floor_m.min(0) + floor_m.max(0))[:2], floor_m[:, 2].max())
-    by_name = {thing.name: thing for thing in room.objects}
-    for thing in original.objects:
-        again = by_name[thing.name]
-        np.testing.assert_allclose(again.mesh.vertices_m.min(0), thing.mesh.vertices_m.min(0) - shift_m, atol=2e-4)
-        np.testing.assert_allclose(again.mesh.vertices_m.max(0), thing.mesh.vertices_m.max(0) - shift_m, atol=2e-4)
+    by_name = {obj.name: obj for obj in room.objects}
+    for obj in original.objects:
+        again = by_name[obj.name]
+        np.testing.assert_allclose(again.mesh.vertices_m.min(0), obj.mesh.vertices_m.min(0) - shift_m, atol=2e-4)
+        np.testing.assert_allclose(again.mesh.vertices_m.max(0), obj.mesh.vertices_m.max(0) - shift_m, atol=2e-4)
         assert again.walkable == (again.category in {"floor", "rug"})
-    assert {thing.category for thing in room.objects} >= {"floor", "wall", "ceiling", "kitchen_counter", "fridge"}
+    assert {obj.category for obj in room.objects} >= {"floor", "wall", "ceiling", "kitchen_counter", "fridge"}
 
 
 @pytest.fixture(scope="module")
@@ -99,18 +99,18 @@ def test_a_blend_in_centimetres_becomes_a_room_in_metres(blend_room: tuple[Room,
     room = blend_room[0]
     assert np.ptp(room.floor_polygon_m, axis=0) == pytest.approx([6.0, 5.0], abs=1e-4)
     assert room.height_m == pytest.approx(2.6, abs=0.03)
-    by_name = {thing.name: thing for thing in room.objects}
+    by_name = {obj.name: obj for obj in room.objects}
     # A box that only its place tells to be the floor.
     assert (by_name["Cube"].category, by_name["Cube"].walkable) == ("floor", True)
     assert by_name["Cube"].mesh.vertices_m[:, 2].max() == pytest.approx(0.0, abs=1e-5)
     assert by_name["Carpet"].category == "rug"
     assert "Secret" not in by_name
-    chairs = [thing for thing in room.objects if thing.name.startswith("Seat")]
-    assert [thing.category for thing in chairs] == ["chair", "chair"]
-    middles_m = sorted(float(thing.mesh.vertices_m[:, 0].mean()) for thing in chairs)
+    chairs = [obj for obj in room.objects if obj.name.startswith("Seat")]
+    assert [obj.category for obj in chairs] == ["chair", "chair"]
+    middles_m = sorted(float(obj.mesh.vertices_m[:, 0].mean()) for obj in chairs)
     assert middles_m == pytest.approx([0.0, 1.5], abs=1e-4)
-    for thing in chairs:
-        assert _volume_m3(thing.mesh) == pytest.approx(0.4 * 0.4 * 0.45, rel=1e-4)
+    for obj in chairs:
+        assert _volume_m3(obj.mesh) == pytest.approx(0.4 * 0.4 * 0.45, rel=1e-4)
     assert by_name["Round Table"].category == "table"
     # Subdivided as it is rendered, but three times instead of eleven.
     assert len(by_name["Sofa"].mesh.faces) == 2 * 6 * 4**3
@@ -140,7 +140,7 @@ def test_nothing_in_a_blend_runs_and_nothing_of_it_is_kept(blend_room: tuple[Roo
 def test_two_runs_give_the_same_room(blend_room: tuple[Room, Path], tmp_path: Path) -> None:
     first, folder = blend_room
     again = _make(folder / "given" / "scene.blend", tmp_path / "work")
-    assert [thing.name for thing in first.objects] == [thing.name for thing in again.objects]
+    assert [obj.name for obj in first.objects] == [obj.name for obj in again.objects]
     for one, other in zip(first.objects, again.objects, strict=True):
         assert np.array_equal(one.mesh.vertices_m, other.mesh.vertices_m)
         assert np.array_equal(one.mesh.faces, other.mesh.faces)
@@ -168,15 +168,15 @@ def test_one_mesh_is_parted_into_floor_and_rest(tmp_path: Path) -> None:
     both.apply_transform(Y_UP_FROM_Z_UP)
     trimesh.Scene({"scan": both}).export(str(tmp_path / "scene.glb"))
     room = _make(tmp_path / "scene.glb", tmp_path / "work")
-    assert [(thing.category, thing.walkable) for thing in room.objects] == [("clutter", False), ("floor", True)]
+    assert [(obj.category, obj.walkable) for obj in room.objects] == [("clutter", False), ("floor", True)]
     # The block stands on the shell's floor, which is whole beneath it.
-    assert [len(thing.mesh.faces) for thing in room.objects] == [22, 2]
+    assert [len(obj.mesh.faces) for obj in room.objects] == [22, 2]
     assert room.height_m == pytest.approx(2.7, abs=0.03)
 
 
-def _room_of(things: list[SceneObject]) -> Room:
+def _room_of(objs: list[SceneObject]) -> Room:
     square_m = np.array([[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [-3.0, 3.0]])
-    return Room("bad", "scene", square_m, 2.5, tuple(things), (), None)
+    return Room("bad", "scene", square_m, 2.5, tuple(objs), (), None)
 
 
 def _box(name: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> SceneObject:
@@ -214,8 +214,8 @@ def _scaled(factor: float) -> Callable[[Path], None]:
 
 
 def _doors_of_20_m(path: Path) -> None:
-    things = [*_floor(), _box("door", (-0.5, 2.9, 0), (0.5, 3.0, 2.05))]
-    write_scene(_room_of(things), path, Y_UP_FROM_Z_UP @ np.diag([10.0, 10.0, 10.0, 1.0]))
+    objs = [*_floor(), _box("door", (-0.5, 2.9, 0), (0.5, 3.0, 2.05))]
+    write_scene(_room_of(objs), path, Y_UP_FROM_Z_UP @ np.diag([10.0, 10.0, 10.0, 1.0]))
 
 
 def _nothing(path: Path) -> None:

@@ -17,12 +17,12 @@ FRAMES, FPS = 12, 12.0
 START_M, END_M = np.array([-2.4, 0.5, 1.4]), np.array([-2.4, -0.5, 1.4])
 TARGET_M = np.array([1.5, 0.5, 1.2])
 ROOM = camera_room()
-CASTER = Caster(join([thing.mesh for thing in ROOM.objects]))
+CASTER = Caster(join([obj.mesh for obj in ROOM.objects]))
 
 
 def _line(start_m: Float64[np.ndarray, "3"], end_m: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "T 3"]:
-    share = np.linspace(0.0, 1.0, FRAMES)[:, None]
-    return np.asarray((1.0 - share) * start_m + share * end_m)
+    fraction = np.linspace(0.0, 1.0, FRAMES)[:, None]
+    return np.asarray((1.0 - fraction) * start_m + fraction * end_m)
 
 
 def _audit(
@@ -46,7 +46,7 @@ def _only_rule(audit: CameraAudit) -> str:
 
 def test_a_good_path_passes_with_exact_figures() -> None:
     audit = _audit(_line(START_M, END_M))
-    assert audit.passed and audit.focus_share[0] == 1.0
+    assert audit.passed and audit.focus_fraction[0] == 1.0
     assert audit.scene_distance_m[0] == pytest.approx(0.6, abs=1e-5)
     assert audit.travel_m[0] == pytest.approx(1.0)
 
@@ -84,8 +84,8 @@ def test_distance_to_an_actor_is_the_least_of_all_sub_steps() -> None:
     focus = np.ones((1, FRAMES, 1), bool)
     paths, meshes = (camera_path(camera_m, TARGET_M),), (MovingMesh(actor),)
     audit = audit_paths(paths, focus, ROOM, (actor,), meshes, CASTER, FPS, CamerasConfig(count=1))
-    share = np.linspace(0.0, 1.0, 8 * (FRAMES - 1) + 1)[:, None]
-    between_m = (1.0 - share) * (camera_m[0] - walk_m[0]) + share * (camera_m[-1] - walk_m[-1])
+    fraction = np.linspace(0.0, 1.0, 8 * (FRAMES - 1) + 1)[:, None]
+    between_m = (1.0 - fraction) * (camera_m[0] - walk_m[0]) + fraction * (camera_m[-1] - walk_m[-1])
     still = Caster(TriMesh(walker(0, np.zeros((1, 2))).vertices_m[0].astype(np.float64), actor.faces))
     assert audit.actor_distance_m[0] == pytest.approx(still.closest_distance(between_m).min(), abs=1e-4)
 
@@ -99,7 +99,7 @@ def test_outside_of_the_room() -> None:
 def test_looking_away_from_the_focus() -> None:
     audit = _audit(_line(START_M, END_M), np.array([-3.0, 0.0, 1.2]))
     assert "focus" in {violation.rule for violation in audit.violations}
-    assert audit.focus_share[0] == 0.0
+    assert audit.focus_fraction[0] == 0.0
 
 
 def test_too_fast() -> None:
@@ -141,13 +141,13 @@ def test_an_actor_seen_by_too_few_views() -> None:
     config = CamerasConfig(count=4, min_focus_share=0.0, min_apart_deg=0.0)
     audit = _two_views(np.array([3.0, -1.6, 1.2]), config)
     assert _only_rule(audit) == "coverage"
-    assert audit.violations[0].subject == "actor 0" and audit.covered_share.tolist() == [0.0]
+    assert audit.violations[0].subject == "actor 0" and audit.covered_fraction.tolist() == [0.0]
 
 
 def test_views_of_an_actor_from_too_like_directions() -> None:
     seen_m = np.array([1.0, 1.0, 1.2])
     audit = _two_views(seen_m, CamerasConfig(count=4, min_apart_deg=89.0))
-    assert audit.passed and audit.covered_share.tolist() == [1.0]
+    assert audit.passed and audit.covered_fraction.tolist() == [1.0]
     assert audit.apart_deg[0] == pytest.approx(90.0, abs=0.5)
     audit = _two_views(seen_m, CamerasConfig(count=4, min_apart_deg=91.0))
     assert _only_rule(audit) == "apart"
@@ -161,15 +161,16 @@ def test_distance_to_a_deforming_mesh_is_exact() -> None:
         actor, vertices_m=actor.vertices_m + rng.normal(0.0, 0.05, actor.vertices_m.shape).astype(np.float32)
     )
     points_m = rng.uniform((0.4, -0.5, 0.2), (1.5, 0.5, 2.2), (40, 3))
-    frame, share = rng.integers(0, 3, 40).astype(np.int32), rng.uniform(0.0, 1.0, 40)
+    frame, fraction = rng.integers(0, 3, 40).astype(np.int32), rng.uniform(0.0, 1.0, 40)
     between_m = (
-        actor.vertices_m[frame] * (1.0 - share[:, None, None]) + actor.vertices_m[frame + 1] * share[:, None, None]
+        actor.vertices_m[frame] * (1.0 - fraction[:, None, None])
+        + actor.vertices_m[frame + 1] * fraction[:, None, None]
     )
     exact_m = [
         Caster(TriMesh(vertices_m, actor.faces)).closest_distance(point_m[None])[0]
         for vertices_m, point_m in zip(between_m, points_m, strict=True)
     ]
     mesh = MovingMesh(actor)
-    found_m = [mesh.least_distance_m(points_m[i : i + 1], frame[i : i + 1], share[i : i + 1]) for i in range(40)]
+    found_m = [mesh.least_distance_m(points_m[i : i + 1], frame[i : i + 1], fraction[i : i + 1]) for i in range(40)]
     np.testing.assert_allclose(found_m, exact_m, atol=1e-5)
-    assert mesh.least_distance_m(points_m, frame, share) == min(found_m)
+    assert mesh.least_distance_m(points_m, frame, fraction) == min(found_m)

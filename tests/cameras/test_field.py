@@ -20,7 +20,7 @@ def room() -> Room:
 
 @pytest.fixture(scope="module")
 def caster(room: Room) -> Caster:
-    return Caster(join([thing.mesh for thing in room.objects]))
+    return Caster(join([obj.mesh for obj in room.objects]))
 
 
 @pytest.fixture(scope="module")

@@ -151,11 +151,11 @@ def test_travel_wants_speed_and_spread() -> None:
 
 
 def test_revisiting_counts_places_seen_again_after_a_while() -> None:
-    share = torch.linspace(0.0, 1.0, 41, dtype=torch.float64)
+    fraction = torch.linspace(0.0, 1.0, 41, dtype=torch.float64)
     away = torch.zeros(1, 1, 41, 3, dtype=torch.float64)
     back = away.clone()
-    away[..., 0] = 6.0 * share
-    back[..., 0] = 6.0 * torch.minimum(share, 1.0 - share)
+    away[..., 0] = 6.0 * fraction
+    back[..., 0] = 6.0 * torch.minimum(fraction, 1.0 - fraction)
     assert float(losses.revisiting(away, 0.2)) < 0.01 < 0.1 < float(losses.revisiting(back, 0.2))
     assert float(losses.revisiting(away[:, :, :5], 0.2)) == 0.0
 

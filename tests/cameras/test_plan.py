@@ -33,8 +33,8 @@ def test_every_view_moves_and_keeps_its_distance(plan: CameraPlan) -> None:
 
 
 def test_views_see_their_focus_from_different_sides(plan: CameraPlan) -> None:
-    assert plan.audit.focus_share.mean() >= 0.95
-    caster = Caster(join([thing.mesh for thing in camera_room().objects]))
+    assert plan.audit.focus_fraction.mean() >= 0.95
+    caster = Caster(join([obj.mesh for obj in camera_room().objects]))
     coverage = view_coverage(plan.paths, walkers(FRAMES), caster)
     assert np.degrees(np.nanmean(coverage.apart_rad)) >= 60.0
     assert (coverage.sees.sum(axis=0) >= 2).mean(axis=0).min() >= 0.7

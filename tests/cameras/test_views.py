@@ -9,10 +9,10 @@ from tests.support.camera_scene import camera_path, camera_room, walker
 
 
 def _seen(position_m: tuple[float, float, float], target_m: tuple[float, float, float]) -> float:
-    caster = Caster(join([thing.mesh for thing in camera_room().objects]))
+    caster = Caster(join([obj.mesh for obj in camera_room().objects]))
     path = camera_path(np.tile(np.array(position_m), (2, 1)), np.array(target_m))
     actors = (walker(0, np.tile([[-1.5, 0.0]], (2, 1))),)
-    return float(view_coverage((path,), actors, caster).seen_share.mean())
+    return float(view_coverage((path,), actors, caster).seen_fraction.mean())
 
 
 def test_an_actor_in_the_image_is_seen() -> None:
@@ -30,7 +30,7 @@ def test_an_actor_behind_the_table_top_is_not_seen() -> None:
 
 
 def test_angle_between_the_most_different_views() -> None:
-    caster = Caster(join([thing.mesh for thing in camera_room().objects]))
+    caster = Caster(join([obj.mesh for obj in camera_room().objects]))
     actors = (walker(0, np.array([[0.0, 1.0], [0.0, 1.0]])),)
     places = [(2.0, 1.0, 1.5), (0.0, 2.4, 1.5), (np.sqrt(0.5), 1.0 + np.sqrt(0.5), 1.5)]
     paths = tuple(camera_path(np.tile(place, (2, 1)), np.array([0.0, 1.0, 1.2])) for place in places)

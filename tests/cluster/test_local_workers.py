@@ -189,15 +189,15 @@ def test_a_room_of_a_run_that_was_killed_is_taken_over(tmp_path: Path) -> None:
     assert sorted(_computed(tmp_path)) == list(range(20))
 
 
-def _note_share(out: Path, room: int, on_event: OnEvent) -> None:
-    share = machine_share()
-    (out / f"share-{room}").write_text(f"{os.getpid()} {share.worker}/{share.workers}")
+def _note_fraction(out: Path, room: int, on_event: OnEvent) -> None:
+    fraction = machine_share()
+    (out / f"share-{room}").write_text(f"{os.getpid()} {fraction.worker}/{fraction.workers}")
     time.sleep(0.3)
 
 
 def test_each_worker_has_a_place_of_its_own_on_the_machine(tmp_path: Path) -> None:
     """By its place it takes GPUs and CPU threads that no other takes."""
-    work = RoomWork(partial(_note_share, tmp_path), partial(_folder, tmp_path), 1.0)
+    work = RoomWork(partial(_note_fraction, tmp_path), partial(_folder, tmp_path), 1.0)
     assert run_rooms(range(4), 2, work, lambda event: None) == {}
     noted = {path.read_text() for path in tmp_path.glob("share-*")}
     assert {text.split()[1] for text in noted} == {"0/2", "1/2"}

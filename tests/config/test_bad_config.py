@@ -56,7 +56,7 @@ def _write(content: bytes) -> Callable[[Path], None]:
     return spoil
 
 
-# Ten aliases of ten aliases of ...: a few hundred bytes that say 10^12 things.
+# Ten aliases of ten aliases of ...: a few hundred bytes that say 10^12 objects.
 _ALIASES = "\n".join(f"x{k}: &x{k} [{', '.join([f'*x{k - 1}'] * 10) if k else 'lol'}]" for k in range(12))
 
 

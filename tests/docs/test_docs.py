@@ -183,7 +183,7 @@ def test_the_room_source_of_the_page_makes_rooms(extensions: None, tmp_path: Pat
     config = RoomsConfig(source="hall")
     check_source(config)
     rooms = [build_room(config, NavigationConfig(), StageSeed(1, room, "room"), tmp_path) for room in (0, 0, 1)]
-    column_m = [next(thing.mesh.vertices_m for thing in room.objects if thing.category == "column") for room in rooms]
+    column_m = [next(obj.mesh.vertices_m for obj in room.objects if obj.category == "column") for room in rooms]
     assert np.array_equal(column_m[0], column_m[1])
     assert not np.array_equal(column_m[0], column_m[2])
 

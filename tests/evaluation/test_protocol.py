@@ -166,9 +166,9 @@ def test_missing_tracks_count_as_failures(sequence: Sequence, perfect: Predictio
     found = evaluate_sequence(sequence, replace(perfect, camera=camera, world=world, geometry=None))
     assert WORLD_SIMILARITY not in found.scores
     visible = perfect.visible_anywhere & ~Truth(sequence).at_query
-    share = visible[:, 1::2].sum() / visible.sum()
-    assert found.scores[WORLD_MEDIAN].position_accuracy == pytest.approx((share,) * 5)
-    assert found.scores[WORLD_MEDIAN].jaccard == pytest.approx((share,) * 5)
+    fraction = visible[:, 1::2].sum() / visible.sum()
+    assert found.scores[WORLD_MEDIAN].position_accuracy == pytest.approx((fraction,) * 5)
+    assert found.scores[WORLD_MEDIAN].jaccard == pytest.approx((fraction,) * 5)
     assert found.scores[WORLD_MEDIAN].occlusion_accuracy == pytest.approx(0.5)
     for regime in (QUERY_VIEW, OTHER_VIEWS):
         assert 0.3 < found.scores[regime].average_position_accuracy < 0.7

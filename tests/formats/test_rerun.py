@@ -107,7 +107,7 @@ def test_meshes_are_the_kept_ones(recording: Any, made: tuple[Path, Scene]) -> N
         np.testing.assert_array_equal(column(recording, path, "TriangleIndices", static=True), actor.faces)
 
 
-def test_a_thing_has_the_colour_that_the_images_show(recording: Any) -> None:
+def test_a_object_has_the_colour_that_the_images_show(recording: Any) -> None:
     """The synthetic renderer paints the crate orange, in shades."""
     (packed,) = column(recording, "/world/room/crate", "AlbedoFactor", static=True)
     red, green, blue = packed >> 24, packed >> 16 & 255, packed >> 8 & 255

@@ -19,9 +19,9 @@ def test_all_rooms_train_by_default() -> None:
 
 def test_shares_are_kept_and_seeds_differ() -> None:
     drawn = [split_of_room(THREE, 7, room) for room in range(3000)]
-    for name, share in THREE.splits.items():
+    for name, fraction in THREE.splits.items():
         # Four standard deviations of a binomial count.
-        assert abs(drawn.count(name) / 3000 - share) < 4.0 * (share * (1.0 - share) / 3000) ** 0.5
+        assert abs(drawn.count(name) / 3000 - fraction) < 4.0 * (fraction * (1.0 - fraction) / 3000) ** 0.5
     assert drawn != [split_of_room(THREE, 8, room) for room in range(3000)]
 
 
@@ -59,8 +59,8 @@ def test_wrong_shares_are_refused(splits: str, message: str) -> None:
 
 def test_every_path_of_a_room_follows_its_split(tmp_path: Path) -> None:
     """Also after the config went through run.json, whose keys are sorted."""
-    shares = ["export.splits.train=0.7", "export.splits.val=0.2", "export.splits.test=0.1"]
-    config = load_config("tiny", assignments=shares)
+    fractions = ["export.splits.train=0.7", "export.splits.val=0.2", "export.splits.test=0.1"]
+    config = load_config("tiny", assignments=fractions)
     open_run(tmp_path, 7, range(3), config, False)
     stored = read_run(tmp_path).config.export
     for room in range(40):

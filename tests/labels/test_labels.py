@@ -81,7 +81,7 @@ def test_normals_of_the_room_are_those_of_its_six_planes(folder: Path, scene: Sc
             np.testing.assert_allclose(in_world[shell], inwards[shell], atol=1e-6)
 
 
-def test_scene_flow_is_nothing_on_things_and_stays_on_the_bodies(folder: Path, scene: Scene) -> None:
+def test_scene_flow_is_nothing_on_objects_and_stays_on_the_bodies(folder: Path, scene: Scene) -> None:
     for view in range(len(scene.views)):
         moved_m = np.load(folder / f"{view}/scene_flow.npy")
         for frame in (0, 4):
@@ -187,7 +187,7 @@ def test_poses_hold_boxes_that_fit(scene: Scene) -> None:
             np.testing.assert_allclose(poses.box_m[frame, place], [own_m.min(axis=0), own_m.max(axis=0)], atol=1e-6)
 
 
-def test_things_of_any_shape_have_an_upright_frame() -> None:
+def test_objects_of_any_shape_have_an_upright_frame() -> None:
     turned = trimesh.transformations.rotation_matrix(2.2, [0, 0, 1])[:3, :3]
     corners = np.array([[x, y, z] for x in (0.0, 2.0) for y in (0.0, 0.5) for z in (1.0, 4.0)])
     for vertices_m in (corners @ turned.T, corners[corners[:, 1] == 0.0] @ turned.T, corners[:1], np.zeros((0, 3))):

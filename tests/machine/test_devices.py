@@ -95,12 +95,12 @@ def test_workers_share_the_gpus(choice: ModuleType, gpus: int, workers: int, exp
 
 
 @pytest.fixture
-def no_share(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def no_fraction(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setenv(devices.SHARE_VARIABLE, "")
     yield
 
 
-def test_a_process_has_the_machine_to_itself_until_told_otherwise(no_share: None) -> None:
+def test_a_process_has_the_machine_to_itself_until_told_otherwise(no_fraction: None) -> None:
     assert devices.machine_share() == devices.MachineShare(0, 1)
     devices.share_machine(2, 4)
     assert devices.machine_share() == devices.MachineShare(2, 4)

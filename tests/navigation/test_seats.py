@@ -19,11 +19,11 @@ def _chair(turn_rad: float = 0.0, x_m: float = 0.0) -> trimesh.Trimesh:
     return parts
 
 
-def _room(*things: tuple[str, trimesh.Trimesh]) -> Room:
+def _room(*objs: tuple[str, trimesh.Trimesh]) -> Room:
     floor = box((8.0, 8.0, 0.1), (0.0, 0.0, -0.05))
     objects = tuple(
         SceneObject(index, f"{category}_{index}", category, tri(mesh), GREY, category == "floor", True)
-        for index, (category, mesh) in enumerate([("floor", floor), *things], start=1)
+        for index, (category, mesh) in enumerate([("floor", floor), *objs], start=1)
     )
     return Room(
         "room", "livingroom", np.array([[-4.0, -4.0], [4.0, -4.0], [4.0, 4.0], [-4.0, 4.0]]), 2.8, objects, (), None

@@ -122,10 +122,10 @@ def test_pauses_stand_quite_still_at_their_spot_and_face_its_target() -> None:
 
 
 def test_more_time_is_spent_pausing_where_more_is_wished_for() -> None:
-    def standing_share(pause_share: float) -> float:
+    def standing_fraction(pause_share: float) -> float:
         return float(np.mean([(speeds_mps(wander(seed, pause_share=pause_share)) < 1e-6).mean() for seed in range(6)]))
 
-    assert standing_share(0.0) < 0.12 < 0.2 < standing_share(0.4) < 0.7
+    assert standing_fraction(0.0) < 0.12 < 0.2 < standing_fraction(0.4) < 0.7
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -124,7 +124,7 @@ def test_a_chart_is_as_fine_as_its_closest_views(atlas: ModuleType) -> None:
     assert 400.0 / nearest <= wanted[chart_of_polygon[0]] <= 400.0 * nearest
     assert 100.0 / nearest <= typical[chart_of_polygon[0]] <= 100.0 * nearest
     assert 50.0 / nearest <= wanted[chart_of_polygon[3]] <= 50.0 * nearest
-    # Sides that no ray met are as coarse as the coarsest that one did meet; a thing that none met at all is coarser.
+    # Sides that no ray met are as coarse as the coarsest that one did meet; an object that none met at all is coarser.
     np.testing.assert_array_equal(wanted[chart_of_polygon[[1, 2, 4, 5]]], wanted[chart_of_polygon[3]])
     nothing = atlas.Seen(np.zeros(0, int), np.zeros(0))
     unseen = atlas.seen_density(charts, chart_of_polygon, nothing, 7.0).close
@@ -139,11 +139,11 @@ def test_close_surfaces_are_told_from_far_ones() -> None:
     def square(half_m: float, z_m: float) -> TriMesh:
         return TriMesh(np.column_stack([half_m * side, np.full(4, z_m)]), faces)
 
-    things = tuple(
+    objs = tuple(
         SceneObject(index, name, name, mesh, None, False, True)
         for index, name, mesh in ((5, "floor", square(10.0, 0.0)), (9, "table", square(0.4, 1.0)))
     )
-    room = Room("room", "kitchen", np.zeros((4, 2)), 2.5, things, (), None)
+    room = Room("room", "kitchen", np.zeros((4, 2)), 2.5, objs, (), None)
     pose = np.diag([1.0, -1.0, -1.0, 1.0])[None].copy()
     pose[0, 2, 3] = 2.0
     closeness = measure_closeness(room, (CameraPath(0, pose, Intrinsics.centred(100, 100, np.pi / 2.0)),))

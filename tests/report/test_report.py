@@ -84,9 +84,9 @@ def test_visibility_is_counted_over_views_and_frames() -> None:
     first, second = np.array([[1, 1], [1, 0]], bool), np.array([[1, 0], [0, 0]], bool)
     found = measured(tracks_m, view(first), view(second))
     assert found.counts.seeing_views.tolist()[:3] == [1, 2, 1]
-    assert found.visible_share == (0.75, 0.25)
+    assert found.visible_fraction == (0.75, 0.25)
     # One track is seen in both frames, one in half of them.
-    assert found.counts.seen_share.tolist() == [0, 0, 0, 0, 0, 1, 0, 0, 0, 1]
+    assert found.counts.seen_fraction.tolist() == [0, 0, 0, 0, 0, 1, 0, 0, 0, 1]
 
 
 def test_angles_between_views_and_across_the_image() -> None:
@@ -117,7 +117,7 @@ def test_counts_add_up_and_lose_nothing() -> None:
 
 def test_charts_name_their_bars() -> None:
     chart = histogram("far", "m", np.array([0, 3, 0, 1, 0, 0]), TRAVEL_M, "m")
-    assert [(bar.label, bar.count, bar.share, bar.length) for bar in chart.bars] == [
+    assert [(bar.label, bar.count, bar.fraction, bar.length) for bar in chart.bars] == [
         ("0.05 to 0.2 m", 3, 0.75, 1.0),
         ("0.2 to 0.5 m", 0, 0.0, 0.0),
         ("0.5 to 1 m", 1, 0.25, 1 / 3),

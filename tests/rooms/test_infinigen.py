@@ -1,4 +1,4 @@
-"""The Infinigen source without Infinigen: what it asks for, reads back, and does when things go wrong."""
+"""The Infinigen source without Infinigen: what it asks for, reads back, and does when objects go wrong."""
 
 import importlib
 import json
@@ -105,7 +105,7 @@ def test_dimensions_stay_in_their_limits_and_follow_the_seed() -> None:
 def test_the_room_comes_back_as_the_script_wrote_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     _use_script(monkeypatch, tmp_path, WRITE_ROOM)
     room = InfinigenRooms().make(wish("bedroom"), CONFIG, SEED, 0, tmp_path)
-    assert [(thing.object_index, thing.category, thing.walkable) for thing in room.objects] == [
+    assert [(obj.object_index, obj.category, obj.walkable) for obj in room.objects] == [
         (1, "bed", False),
         (2, "floor", True),
     ]

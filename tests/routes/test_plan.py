@@ -133,8 +133,8 @@ def test_pauses_look_at_what_they_are_about() -> None:
     dwells = [(route, dwell) for route in routes for dwell in route.dwells]
     assert dwells
     for route, dwell in dwells:
-        thing = next(thing for thing in ROOM.objects if thing.object_index == dwell.object_index)
-        low_m, high_m = thing.mesh.vertices_m.min(0), thing.mesh.vertices_m.max(0)
+        obj = next(obj for obj in ROOM.objects if obj.object_index == dwell.object_index)
+        low_m, high_m = obj.mesh.vertices_m.min(0), obj.mesh.vertices_m.max(0)
         assert ((dwell.target_m > low_m - 1e-6) & (dwell.target_m < high_m + 1e-6)).all()
         towards = np.array(dwell.target_m[:2]) - route.position_m[dwell.first_frame, :2]
         off_rad = route.heading_rad[dwell.first_frame] - np.arctan2(towards[1], towards[0])

@@ -62,9 +62,10 @@ def walkers(frames: int) -> tuple[ActorMesh, ...]:
         ((0.6, 1.3), (1.6, 0.4)),
         ((0.9, -1.2), (-0.1, -0.9)),
     ]
-    share = np.linspace(0.0, 1.0, frames)[:, None]
+    fraction = np.linspace(0.0, 1.0, frames)[:, None]
     return tuple(
-        walker(i, (1.0 - share) * np.array(start) + share * np.array(end)) for i, (start, end) in enumerate(ends_m)
+        walker(i, (1.0 - fraction) * np.array(start) + fraction * np.array(end))
+        for i, (start, end) in enumerate(ends_m)
     )
 
 

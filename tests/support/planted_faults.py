@@ -146,7 +146,7 @@ def shifted(metres: float) -> Callable[[np.ndarray], None]:
 
 
 def drift(poses: np.ndarray) -> None:
-    """One thing creeps by a tenth of a millimetre."""
+    """One object creeps by a tenth of a millimetre."""
     poses[:, 2, 0, 3] += np.linspace(0.0, 1e-4, len(poses), dtype=np.float32)
 
 
@@ -314,7 +314,7 @@ FAULTS: dict[str, tuple[Fault, str, str]] = {
     "object index one frame late": (
         change("1/object_index.npy", lambda a: np.roll(a, 1, axis=0)), "object index", r"1/object_index.npy\[0, "
     ),
-    "object index of things mixed up": (
+    "object indices mixed up": (
         change("1/object_index.npy", lambda a: np.array([0, 3, 2, 1, 4, 5, 6], np.uint16)[a]),
         "object index of tracks",
         "shows other objects",

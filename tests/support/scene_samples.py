@@ -23,7 +23,7 @@ def procedural_room(kind: RoomKind, room: int = 0) -> Room:
 
 
 def write_scene(room: Room, path: Path, world_from_file: np.ndarray = Y_UP_FROM_Z_UP) -> Path:
-    """Writes a room as .glb, .gltf or .obj, named things and one colour each; Y up unless told otherwise.
+    """Writes a room as .glb, .gltf or .obj, named objects and one colour each; Y up unless told otherwise.
 
     Args:
         room: made of meshes and materials.
@@ -31,16 +31,16 @@ def write_scene(room: Room, path: Path, world_from_file: np.ndarray = Y_UP_FROM_
         world_from_file: applied to all vertices, f64[4, 4].
     """
     scene = trimesh.Scene()
-    for thing in room.objects:
-        mesh = trimesh.Trimesh(thing.mesh.vertices_m, thing.mesh.faces, process=False)
-        assert thing.material is not None
+    for obj in room.objects:
+        mesh = trimesh.Trimesh(obj.mesh.vertices_m, obj.mesh.faces, process=False)
+        assert obj.material is not None
         material = trimesh.visual.material.PBRMaterial(
-            name=thing.material.name,
-            baseColorFactor=[*thing.material.base_color, 1.0],
-            roughnessFactor=thing.material.roughness,
+            name=obj.material.name,
+            baseColorFactor=[*obj.material.base_color, 1.0],
+            roughnessFactor=obj.material.roughness,
         )
         mesh.visual = trimesh.visual.TextureVisuals(material=material)
-        scene.add_geometry(mesh, node_name=thing.name, geom_name=thing.name)
+        scene.add_geometry(mesh, node_name=obj.name, geom_name=obj.name)
     scene.apply_transform(world_from_file)
     if path.suffix == ".gltf":
         for name, content in trimesh.exchange.gltf.export_gltf(scene).items():

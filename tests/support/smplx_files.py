@@ -57,8 +57,8 @@ class _Tube:
 def _flat(first: float, second: float) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """An ellipse that closes at both ends."""
 
-    def radii(share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        round_off = np.minimum(np.sqrt(np.clip(np.minimum(share, 1.0 - share) * 12.0, 0.0, 1.0)) + 0.02, 1.0)
+    def radii(fraction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        round_off = np.minimum(np.sqrt(np.clip(np.minimum(fraction, 1.0 - fraction) * 12.0, 0.0, 1.0)) + 0.02, 1.0)
         return first * round_off, second * round_off
 
     return radii
@@ -107,19 +107,19 @@ def _eye(sign: float) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _ball(radius: float) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    def radii(share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        size = radius * np.sqrt(np.clip(4.0 * share * (1.0 - share), 0.001, 1.0))
+    def radii(fraction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        size = radius * np.sqrt(np.clip(4.0 * fraction * (1.0 - fraction), 0.001, 1.0))
         return size, size
 
     return radii
 
 
 def _mesh(tube: _Tube) -> tuple[np.ndarray, np.ndarray]:
-    share = (np.arange(tube.rings) + 0.5) / tube.rings
+    fraction = (np.arange(tube.rings) + 0.5) / tube.rings
     start, end = np.array(tube.start, dtype=float), np.array(tube.end, dtype=float)
     angle = 2.0 * np.pi * np.arange(tube.segments) / tube.segments
-    places = np.repeat((start + share[:, None] * (end - start))[:, None], tube.segments, axis=1)
-    for axis, radius, wave in zip(tube.axes, tube.radii(share), (np.cos(angle), np.sin(angle)), strict=True):
+    places = np.repeat((start + fraction[:, None] * (end - start))[:, None], tube.segments, axis=1)
+    for axis, radius, wave in zip(tube.axes, tube.radii(fraction), (np.cos(angle), np.sin(angle)), strict=True):
         places[:, :, axis] += radius[:, None] * wave
     ring = np.arange(tube.segments)
     faces = []

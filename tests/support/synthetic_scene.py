@@ -120,9 +120,9 @@ def render(room: Room, actors: tuple[ActorMesh, ...], camera: CameraPath) -> Ren
     size = camera.intrinsics
     rows, columns = np.mgrid[: size.height_px, : size.width_px].reshape(2, -1)
     ray = np.stack([(columns - size.cx_px) / size.fx_px, (rows - size.cy_px) / size.fy_px, np.ones(rows.size)], axis=1)
-    meshes = [thing.mesh for thing in room.objects]
+    meshes = [obj.mesh for obj in room.objects]
     owner = np.repeat(
-        [thing.object_index for thing in room.objects] + [actor.object_index for actor in actors],
+        [obj.object_index for obj in room.objects] + [actor.object_index for actor in actors],
         [len(mesh.faces) for mesh in meshes] + [len(actor.faces) for actor in actors],
     )
     jpegs, depths, indices = [], [], []

@@ -23,7 +23,7 @@ def write_scene(folder: Path, outputs: tuple[str, ...] = ()) -> tuple[Scene, Seq
     """Writes the synthetic scene in the benchmark layout, with labels of every pixel on demand."""
     scene = make_scene()
     tracks = make_scene_tracks(scene)
-    names = [{"object_index": thing.object_index, "category": thing.category} for thing in scene.room.objects]
+    names = [{"object_index": obj.object_index, "category": obj.category} for obj in scene.room.objects]
     names += [
         {"object_index": actor.object_index, "category": "person", "actor": actor.actor} for actor in scene.actors
     ]

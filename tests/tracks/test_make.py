@@ -34,7 +34,7 @@ def test_numbers_and_classes_are_exact(tracks: SequenceTracks) -> None:
 
 def test_points_lie_on_their_triangles(tracks: SequenceTracks) -> None:
     scene = make_scene()
-    meshes = {thing.object_index: (thing.mesh.vertices_m[None], thing.mesh.faces) for thing in scene.room.objects}
+    meshes = {obj.object_index: (obj.mesh.vertices_m[None], obj.mesh.faces) for obj in scene.room.objects}
     meshes |= {actor.object_index: (actor.vertices_m.astype(np.float64), actor.faces) for actor in scene.actors}
     points = tracks.points
     assert (points.barycentric >= 0).all()
@@ -174,7 +174,7 @@ def test_fast_tracks_get_their_share_as_far_as_there_are_any() -> None:
         scene, actors=(dataclasses.replace(scene.actors[0], vertices_m=vertices_m), scene.actors[1])
     )
     fast = {}
-    for share in (0.0, 0.28, 0.9):
-        points = make_scene_tracks(scene, TracksConfig(count=100, fast_share=share)).points
-        fast[share] = int(is_fast(points.position_m, travel_m(points.position_m)).sum())
+    for fraction in (0.0, 0.28, 0.9):
+        points = make_scene_tracks(scene, TracksConfig(count=100, fast_share=fraction)).points
+        fast[fraction] = int(is_fast(points.position_m, travel_m(points.position_m)).sum())
     assert fast[0.0] < 20 and 28 <= fast[0.28] < 30 and fast[0.9] == 30, fast

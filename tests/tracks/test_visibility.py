@@ -169,7 +169,7 @@ def test_a_pixel_beside_the_projection_is_enough_and_none_is_not() -> None:
     assert shown[beside].all() and not shown[between & ~beside].any()
 
 
-def _blocked_share(start_m: np.ndarray, end_m: np.ndarray, triangles_m: np.ndarray) -> np.ndarray:
+def _blocked_fraction(start_m: np.ndarray, end_m: np.ndarray, triangles_m: np.ndarray) -> np.ndarray:
     """Where along each segment (0 to 1) the first triangle is met, in double precision, all against all
     (Moeller and Trumbore 1997); infinite for none."""
     first, second = triangles_m[:, 1] - triangles_m[:, 0], triangles_m[:, 2] - triangles_m[:, 0]
@@ -181,9 +181,9 @@ def _blocked_share(start_m: np.ndarray, end_m: np.ndarray, triangles_m: np.ndarr
             offset = (start - triangles_m[:, 0]) / determinant[:, None]
             u = np.einsum("fc,fc->f", offset, across)
             turned = np.cross(offset, first)
-            v, share = turned @ (end - start), np.einsum("fc,fc->f", turned, second)
-        met = (u >= 0) & (v >= 0) & (u + v <= 1) & (share > 0)
-        nearest[ray] = share[met].min(initial=np.inf)
+            v, fraction = turned @ (end - start), np.einsum("fc,fc->f", turned, second)
+        met = (u >= 0) & (v >= 0) & (u + v <= 1) & (fraction > 0)
+        nearest[ray] = fraction[met].min(initial=np.inf)
     return nearest
 
 
@@ -194,14 +194,14 @@ def test_visibility_is_what_an_exact_search_over_all_triangles_says() -> None:
     differs = entries = hidden = 0
     for frame in range(0, 6, 2):
         people = [TriMesh(actor.vertices_m[frame].astype(np.float64), actor.faces) for actor in scene.actors]
-        joined = join([thing.mesh for thing in scene.room.objects] + people)
+        joined = join([obj.mesh for obj in scene.room.objects] + people)
         triangles_m = joined.vertices_m[joined.faces]
         point_m = tracks.points.position_m[frame]
         for index, camera in enumerate(scene.cameras):
             inside = inside_image(camera.intrinsics, tracks.views.pixel_px[index, frame])
             start_m = np.repeat(camera.world_from_camera[frame][None, :3, 3], int(inside.sum()), axis=0)
             truth = np.zeros(len(point_m), bool)
-            truth[inside] = _blocked_share(start_m, point_m[inside], triangles_m) > 1.0 - 1e-4
+            truth[inside] = _blocked_fraction(start_m, point_m[inside], triangles_m) > 1.0 - 1e-4
             differs += int((truth != tracks.views.visible[index, frame]).sum())
             entries += len(point_m)
             hidden += int((inside & ~truth).sum())

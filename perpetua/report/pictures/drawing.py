@@ -60,7 +60,7 @@ def depth_colours(depth_m: Float[np.ndarray, "H W"], nearest_m: float, farthest_
     """Near is bright, far is dark violet, evenly in metres; black where there is none."""
     import cv2
 
-    share = (farthest_m - depth_m) / max(farthest_m - nearest_m, 1e-9)
-    level = (255 * np.clip(0.08 + 0.92 * share, 0.0, 1.0)).astype(np.uint8)
+    fraction = (farthest_m - depth_m) / max(farthest_m - nearest_m, 1e-9)
+    level = (255 * np.clip(0.08 + 0.92 * fraction, 0.0, 1.0)).astype(np.uint8)
     colours = cv2.applyColorMap(level, cv2.COLORMAP_INFERNO)[:, :, ::-1]
     return np.ascontiguousarray(np.where((depth_m > 0)[:, :, None], colours, 0).astype(np.uint8))

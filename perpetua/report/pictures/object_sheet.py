@@ -1,4 +1,4 @@
-"""Which object each pixel shows: people bright, things pale, the large ones with their names."""
+"""Which object each pixel shows: people bright, objects pale, the large ones with their names."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from perpetua.report.pictures.drawing import BACKGROUND, INK, text_font
 from perpetua.report.pictures.sheets import CELL_WIDTH_PX, Row, assemble, evenly_spread, nearest_resized
 
 # An object is named where it covers so much of the image; smaller ones would only hide what is behind their names.
-NAMED_SHARE = 0.02
+NAMED_FRACTION = 0.02
 MOST_NAMES = 8
 NAME_PX, STROKE_PX = 12, 2
 
@@ -63,7 +63,7 @@ def _largest(object_index: UInt16[np.ndarray, "H W"]) -> list[int]:
     counts: Int64[np.ndarray, " _"] = np.bincount(object_index.ravel())
     counts[0] = 0
     order = np.argsort(counts)[::-1][:MOST_NAMES]
-    return [index for index in order.tolist() if counts[index] > NAMED_SHARE * object_index.size]
+    return [index for index in order.tolist() if counts[index] > NAMED_FRACTION * object_index.size]
 
 
 def _inner_pixel(mask: np.ndarray) -> Float64[np.ndarray, "2"]:

@@ -20,7 +20,7 @@ FRUSTA = 5
 MOVING_M = 0.05
 HEAD_ROOM_M = 2.2
 # What spreads over more of the floor is the floor itself or the like, and would hide the rest.
-STRUCTURE_SHARE = 0.6
+STRUCTURE_FRACTION = 0.6
 # Footprints are convex: that of a wall around a corner would cover floor. Such walls the floor's outline shows.
 WALLS = ("wall", "skirting_board")
 THICKEST_WALL_M = 0.25
@@ -66,15 +66,15 @@ def _draw_room(plan: Axes, record: dict[str, Any]) -> None:
     if outline:
         plan.add_patch(Polygon(outline, facecolor="#f4f1ea", edgecolor="black", linewidth=2.0, zorder=0))
     floor_m2 = float(np.prod(np.ptp(outline, axis=0))) if outline else np.inf
-    things = [thing for thing in record.get("objects", []) if len(thing.get("footprint_m", [])) >= 3]
-    for thing in sorted(things, key=lambda thing: thing["height_range_m"][1]):
-        spread_m2 = float(np.prod(np.ptp(thing["footprint_m"], axis=0)))
-        if thing["height_range_m"][0] > HEAD_ROOM_M or spread_m2 > STRUCTURE_SHARE * floor_m2:
+    objs = [obj for obj in record.get("objects", []) if len(obj.get("footprint_m", [])) >= 3]
+    for obj in sorted(objs, key=lambda obj: obj["height_range_m"][1]):
+        spread_m2 = float(np.prod(np.ptp(obj["footprint_m"], axis=0)))
+        if obj["height_range_m"][0] > HEAD_ROOM_M or spread_m2 > STRUCTURE_FRACTION * floor_m2:
             continue
-        if thing["category"] in WALLS and _width_m(np.array(thing["footprint_m"], np.float32)) > THICKEST_WALL_M:
+        if obj["category"] in WALLS and _width_m(np.array(obj["footprint_m"], np.float32)) > THICKEST_WALL_M:
             continue
-        shade = "#dfe8d8" if thing["walkable"] else "#c9b79c"
-        plan.add_patch(Polygon(thing["footprint_m"], facecolor=shade, edgecolor="#7a6a50", linewidth=0.6, zorder=1))
+        shade = "#dfe8d8" if obj["walkable"] else "#c9b79c"
+        plan.add_patch(Polygon(obj["footprint_m"], facecolor=shade, edgecolor="#7a6a50", linewidth=0.6, zorder=1))
 
 
 def _width_m(footprint_m: Float32[np.ndarray, "N 2"]) -> float:
@@ -107,11 +107,11 @@ def _draw_camera(plan: Axes, view: SequenceView, number: int) -> None:
     plan.plot(
         centre_m[:, 0], centre_m[:, 1], color=colour, linewidth=1.5, linestyle="--", zorder=5, label=f"view {number}"
     )
-    for share in np.linspace(0.0, 1.0, FRUSTA):
-        frame = round(share * (len(centre_m) - 1))
+    for fraction in np.linspace(0.0, 1.0, FRUSTA):
+        frame = round(fraction * (len(centre_m) - 1))
         corners_m = _frustum_m(view, frame, centre_m[frame])
         plan.fill(corners_m[:, 0], corners_m[:, 1], facecolor=colour, alpha=0.08, edgecolor="none", zorder=2)
-        plan.plot(corners_m[:, 0], corners_m[:, 1], color=colour, alpha=0.9 - 0.6 * share, linewidth=0.8, zorder=5)
+        plan.plot(corners_m[:, 0], corners_m[:, 1], color=colour, alpha=0.9 - 0.6 * fraction, linewidth=0.8, zorder=5)
     x_m, y_m, _ = centre_m[0]
     plan.text(x_m, y_m, f" {number}", color=colour, fontsize=12, fontweight="bold", zorder=6)
 
@@ -150,7 +150,7 @@ def _draw_curves(rows: list[Axes], curves: dict[str, Any], record: dict[str, Any
 
 
 def _people(record: dict[str, Any]) -> list[dict[str, Any]]:
-    return [thing for thing in record.get("objects", []) if thing.get("route_m")]
+    return [obj for obj in record.get("objects", []) if obj.get("route_m")]
 
 
 def _caption(person: dict[str, Any]) -> str:

@@ -15,7 +15,7 @@ from perpetua.scene.room import Room
 TOP, FIRST_CORNER, SECOND_CORNER = 0, 1, 2
 WIDTH_PX, HEIGHT_PX = 384, 288
 # From far above, so that walls hide little; what is higher than this share of the room is cut off.
-TOP_FOV_RAD, CUT_SHARE = math.radians(28.0), 0.92
+TOP_FOV_RAD, CUT_FRACTION = math.radians(28.0), 0.92
 # Walls stand around the floor, and some space around the walls.
 TOP_MARGIN_M = 0.35
 CORNER_FOV_RAD = math.radians(82.0)
@@ -40,7 +40,7 @@ class RoomViews:
 def place_views(room: Room) -> RoomViews:
     """A view from above and two from opposite corners at eye height, where furniture does not block them."""
     top, near_m = _from_above(room)
-    caster = Caster(join([thing.mesh for thing in room.objects]))
+    caster = Caster(join([obj.mesh for obj in room.objects]))
     low_m, high_m = room.floor_polygon_m.min(0), room.floor_polygon_m.max(0)
     diagonals = [
         (np.array([low_m[0], low_m[1]]), np.array([high_m[0], high_m[1]])),
@@ -66,7 +66,7 @@ def _from_above(room: Room) -> tuple[CameraPath, float]:
     intrinsics = Intrinsics.centred(WIDTH_PX, HEIGHT_PX, TOP_FOV_RAD)
     half_m = 0.5 * np.array([sides_m[across], sides_m[1 - across]])
     half_px = 0.5 * np.array([WIDTH_PX, HEIGHT_PX])
-    cut_m = CUT_SHARE * room.height_m
+    cut_m = CUT_FRACTION * room.height_m
     distance_m = float((half_m * intrinsics.fx_px / half_px).max())
     right = np.eye(3)[across]
     forward = np.array([0.0, 0.0, -1.0])

@@ -12,7 +12,7 @@ from perpetua.report.pictures.drawing import Canvas, Colour, track_colour
 
 MOVING_TRACKS = 90
 STILL_TRACKS = 60
-TAIL_SHARE = 0.1
+TAIL_FRACTION = 0.1
 LONGEST_TAIL_FRAMES = 16
 MOVING_M = 0.05
 # Nearer to the camera's plane, or behind it, a point has no pixel worth drawing.
@@ -36,7 +36,7 @@ def choose_tracks(sequence: Sequence) -> ShownTracks:
     """As many tracks as a picture can bear, evenly from those that move and those that do not."""
     moves = moves_more_than(sequence.tracks_m, MOVING_M)
     still, moving = (_evenly(np.flatnonzero(~moves), STILL_TRACKS), _evenly(np.flatnonzero(moves), MOVING_TRACKS))
-    tail_frames = max(2, round(TAIL_SHARE * len(sequence.tracks_m)))
+    tail_frames = max(2, round(TAIL_FRACTION * len(sequence.tracks_m)))
     return ShownTracks(
         np.concatenate([still, moving]),
         frozenset(moving.tolist()),

@@ -54,7 +54,7 @@ def check_room(room: Room, config: RoomsConfig, navigation: NavigationConfig) ->
 
 
 def _check_object_indices(room: Room) -> None:
-    indices = [thing.object_index for thing in room.objects]
+    indices = [obj.object_index for obj in room.objects]
     if len(set(indices)) != len(indices):
         twice = sorted({index for index in indices if indices.count(index) > 1})
         raise RoomRejected("object indices", f"object indices must be unique, but {twice[:5]} occur more than once")
@@ -64,20 +64,20 @@ def _check_object_indices(room: Room) -> None:
 
 
 def _check_vertices(room: Room) -> None:
-    for thing in room.objects:
-        if not np.isfinite(thing.mesh.vertices_m).all():
-            raise RoomRejected("finite vertices", f"every vertex must be finite, but some of '{thing.name}' are not")
+    for obj in room.objects:
+        if not np.isfinite(obj.mesh.vertices_m).all():
+            raise RoomRejected("finite vertices", f"every vertex must be finite, but some of '{obj.name}' are not")
 
 
 def _check_triangles(room: Room, max_triangles: int) -> int:
-    triangles = sum(len(thing.mesh.faces) for thing in room.objects)
+    triangles = sum(len(obj.mesh.faces) for obj in room.objects)
     if triangles > max_triangles:
         raise RoomRejected("triangles", f"the room has {triangles} triangles; rooms.max_triangles is {max_triangles}")
     return triangles
 
 
 def _check_furniture(room: Room) -> None:
-    present = {thing.category for thing in room.objects}
+    present = {obj.category for obj in room.objects}
     for group in REQUIRED_FURNITURE[room.kind]:
         if present.isdisjoint(group):
             wanted = " or ".join(f"'{category}'" for category in sorted(group))

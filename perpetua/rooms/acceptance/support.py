@@ -1,15 +1,15 @@
-"""What holds each thing of a room up, from the meshes as rendered: nothing may hang in the air or be sunk.
+"""What holds each object of a room up, from the meshes as rendered: nothing may hang in the air or be sunk.
 
-A thing is *held* when a chain of contacts joins it to the building. Two contacts count, both within ``TOUCH_M``:
+An object is *held* when a chain of contacts joins it to the building. Two contacts count, both within ``TOUCH_M``:
 
-- it rests: straight below some point of its underside lies the surface of a held thing;
-- it is fixed: in some direction from its surface, or inside it, lies the surface of a held thing. This counts only
+- it rests: straight below some point of its underside lies the surface of a held object;
+- it is fixed: in some direction from its surface, or inside it, lies the surface of a held object. This counts only
   for what can hang, lean or be built in (a painting, a tap, a wall cabinet). What stands by its nature
-  (``STANDING``: seats, tables, beds, things on shelves) has to rest, so a chair that hovers beside a wall floats.
+  (``STANDING``: seats, tables, beds, objects on shelves) has to rest, so a chair that hovers beside a wall floats.
 
 Parts of one piece of furniture, which have its category and overlap its box, hold each other.
 
-A standing thing is *sunk* when most of its feet lie deeper than ``TOUCH_M`` below the upward surface of another.
+A standing object is *sunk* when most of its feet lie deeper than ``TOUCH_M`` below the upward surface of another.
 Rays decide all of it, each against every triangle of the room, so what is found is what a picture shows.
 """
 
@@ -59,8 +59,8 @@ FURNITURE = frozenset(
         "table_lamp",
     }
 )
-# Things that lie or stand on something.
-SMALL_THINGS = frozenset(
+# Objects that lie or stand on something.
+SMALL_OBJECTS = frozenset(
     {
         "books",
         "bottle",
@@ -78,13 +78,13 @@ SMALL_THINGS = frozenset(
         "vase",
     }
 )
-STANDING = FURNITURE | SMALL_THINGS
+STANDING = FURNITURE | SMALL_OBJECTS
 # An underside is looked at on about this many places each way, and no closer than this.
 PLACES_PER_SIDE = 24
 MIN_SPACING_M = 0.01
 # Feet are what lies within this of the lowest point.
 FEET_M = 0.02
-# A ray passes this many surfaces, its own thing's among them.
+# A ray passes this many surfaces, its own object's among them.
 MAX_SURFACES = 8
 MIN_UPWARD_NORMAL = 0.5
 _PAST_SURFACE_M = 1e-5
@@ -99,7 +99,7 @@ _AROUND = _AROUND / np.linalg.norm(_AROUND, axis=1, keepdims=True)
 
 @dataclass(frozen=True)
 class Fault:
-    """A thing that nothing holds (``floats``), or that is sunk: how far it would fall, or how deep it is."""
+    """An object that nothing holds (``floats``), or that is sunk: how far it would fall, or how deep it is."""
 
     name: str
     category: str
@@ -113,36 +113,36 @@ class Fault:
 
 
 def find_faults(objects: tuple[SceneObject, ...]) -> tuple[Fault, ...]:
-    """Every thing that nothing holds, or that is sunk by more than ``TOUCH_M``, in the order of ``objects``."""
-    solid = tuple(thing for thing in objects if len(thing.mesh.faces))
+    """Every object that nothing holds, or that is sunk by more than ``TOUCH_M``, in the order of ``objects``."""
+    solid = tuple(obj for obj in objects if len(obj.mesh.faces))
     if not solid:
         return ()
-    scene = _Scene(tuple(_raised(thing, number) for number, thing in enumerate(solid)))
+    scene = _Scene(tuple(_raised(obj, number) for number, obj in enumerate(solid)))
     held = _held(scene)
     return tuple(fault for k in range(len(solid)) if (fault := _fault(scene, k, bool(held[k]))) is not None)
 
 
-def _raised(thing: SceneObject, number: int) -> SceneObject:
-    """A thing a hair higher, each by another amount: a foot that ends in the plane of the floor would hide the floor
+def _raised(obj: SceneObject, number: int) -> SceneObject:
+    """An object a hair higher, each by another amount: a foot that ends in the plane of the floor would hide the floor
     from rays, which see one of two surfaces at one place."""
-    if thing.category in BUILDING:
-        return thing
+    if obj.category in BUILDING:
+        return obj
     lift_m = RAISED_M * (0.1 + 0.9 * (number * GOLDEN_SECTION % 1.0))
-    return replace(thing, mesh=TriMesh(thing.mesh.vertices_m + np.array([0.0, 0.0, lift_m]), thing.mesh.faces))
+    return replace(obj, mesh=TriMesh(obj.mesh.vertices_m + np.array([0.0, 0.0, lift_m]), obj.mesh.faces))
 
 
 def _fault(scene: "_Scene", k: int, held: bool) -> Fault | None:
-    thing = scene.objects[k]
+    obj = scene.objects[k]
     # What lies too deep to rest on anything is sunk, though nothing below holds it.
-    depth_m = scene.depth_m(k) if thing.category in STANDING else 0.0
+    depth_m = scene.depth_m(k) if obj.category in STANDING else 0.0
     if depth_m > TOUCH_M:
-        return Fault(thing.name, thing.category, False, depth_m)
-    return None if held else Fault(thing.name, thing.category, True, scene.drop_m(k))
+        return Fault(obj.name, obj.category, False, depth_m)
+    return None if held else Fault(obj.name, obj.category, True, scene.drop_m(k))
 
 
 def _held(scene: "_Scene") -> Bool[np.ndarray, " N"]:
-    """Which things a chain of contacts joins to the building."""
-    held = np.array([thing.category in BUILDING for thing in scene.objects], bool)
+    """Which objects a chain of contacts joins to the building."""
+    held = np.array([obj.category in BUILDING for obj in scene.objects], bool)
     touches = scene.rests_on() | scene.parts_of_one()
     loose = ~_joined(held, touches)
     # Looking in every direction is dear, so only what does not rest is looked at.
@@ -163,51 +163,51 @@ class _Scene:
 
     def __init__(self, objects: tuple[SceneObject, ...]) -> None:
         self.objects = objects
-        mesh = join([thing.mesh for thing in objects])
+        mesh = join([obj.mesh for obj in objects])
         self._caster = Caster(mesh)
-        self._owner = np.repeat(np.arange(len(objects)), [len(thing.mesh.faces) for thing in objects])
+        self._owner = np.repeat(np.arange(len(objects)), [len(obj.mesh.faces) for obj in objects])
         corners_m = mesh.vertices_m[mesh.faces]
         normal = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
         self._upward = normal[:, 2] > MIN_UPWARD_NORMAL * np.linalg.norm(normal, axis=1)
 
     def rests_on(self) -> Bool[np.ndarray, "N N"]:
-        """[i, j]: thing j lies within reach straight below (or a little above) the underside of thing i.
+        """[i, j]: object j lies within reach straight below (or a little above) the underside of object i.
 
         The building rests on nothing.
         """
         nothing = np.zeros((0, 3))
-        undersides = [nothing if thing.category in BUILDING else _underside_m(thing.mesh) for thing in self.objects]
+        undersides = [nothing if obj.category in BUILDING else _underside_m(obj.mesh) for obj in self.objects]
         return self._touches(undersides, _DOWN)
 
     def parts_of_one(self) -> Bool[np.ndarray, "N N"]:
-        """[i, j]: things i and j are parts of one piece of furniture."""
-        low_m = np.array([thing.mesh.vertices_m.min(axis=0) for thing in self.objects]) - TOUCH_M
-        high_m = np.array([thing.mesh.vertices_m.max(axis=0) for thing in self.objects])
+        """[i, j]: objects i and j are parts of one piece of furniture."""
+        low_m = np.array([obj.mesh.vertices_m.min(axis=0) for obj in self.objects]) - TOUCH_M
+        high_m = np.array([obj.mesh.vertices_m.max(axis=0) for obj in self.objects])
         overlap = ((low_m[:, None] <= high_m) & (low_m <= high_m[:, None])).all(axis=2)
         return overlap & self._alike()
 
     def _alike(self) -> Bool[np.ndarray, "N N"]:
-        category = np.array([thing.category for thing in self.objects])
+        category = np.array([obj.category for obj in self.objects])
         return np.asarray((category[:, None] == category) & np.isin(category, sorted(FURNITURE)))
 
-    def fixed_to(self, things: list[int]) -> Bool[np.ndarray, "N N"]:
-        """[i, j]: thing j lies within reach of the surface of thing i, one of ``things``, in some direction."""
+    def fixed_to(self, objs: list[int]) -> Bool[np.ndarray, "N N"]:
+        """[i, j]: object j lies within reach of the surface of object i, one of ``objs``, in some direction."""
         surfaces = [np.zeros((0, 3))] * len(self.objects)
-        for k in things:
+        for k in objs:
             surfaces[k] = _thinned(_points_m(self.objects[k].mesh), 3)
         return self._touches(surfaces, _AROUND)
 
     def drop_m(self, k: int) -> float:
-        """How far a thing could fall."""
+        """How far an object could fall."""
         points_m = _underside_m(self.objects[k].mesh)
         distance_m, owner, _ = self._pierce(points_m, np.repeat(_DOWN, len(points_m), axis=0))
         return float(np.where(owner != k, distance_m, np.inf).min(initial=np.inf))
 
     def depth_m(self, k: int) -> float:
-        """How deep most feet of a thing lie below the upward surface of another that crosses the thing."""
+        """How deep most feet of an object lie below the upward surface of another that crosses the object."""
         feet_m = _feet_m(self.objects[k].mesh) - _PAST_SURFACE_M * _DOWN
         distance_m, owner, face = self._pierce(feet_m, np.repeat(-_DOWN, len(feet_m), axis=0))
-        # Only what lies between a foot and its own thing's next surface above is inside the thing.
+        # Only what lies between a foot and its own object's next surface above is inside the object.
         own = owner == k
         before_own = (np.cumsum(own, axis=1) == 0) & own.any(axis=1, keepdims=True)
         crossing = before_own & (owner >= 0) & self._upward[face] & ~self._alike()[k][owner]
@@ -216,7 +216,7 @@ class _Scene:
     def _touches(
         self, points_m: list[Float64[np.ndarray, "_ 3"]], directions: Float64[np.ndarray, "D 3"]
     ) -> Bool[np.ndarray, "N N"]:
-        """[i, j]: thing j crosses the lines of 2 ``TOUCH_M`` through the points of thing i along the directions."""
+        """[i, j]: object j crosses the lines of 2 ``TOUCH_M`` through the points of object i along the directions."""
         asking = np.repeat(np.arange(len(points_m)), [len(some_m) * len(directions) for some_m in points_m])
         origins_m = np.repeat(np.concatenate(points_m), len(directions), axis=0)
         along = np.tile(directions, (sum(map(len, points_m)), 1))
@@ -267,8 +267,8 @@ def _along_edges_m(mesh: TriMesh, spacing_m: float) -> Float64[np.ndarray, "_ 3"
     steps = np.ceil(np.linalg.norm(ends_m[:, 1] - ends_m[:, 0], axis=1) / spacing_m).astype(np.int64)
     edge = np.repeat(np.arange(len(ends_m)), steps)
     number = np.arange(len(edge)) - np.repeat(np.cumsum(steps) - steps, steps)
-    share = ((number + 0.5) / steps[edge])[:, None]
-    return np.asarray((1.0 - share) * ends_m[edge, 0] + share * ends_m[edge, 1])
+    fraction = ((number + 0.5) / steps[edge])[:, None]
+    return np.asarray((1.0 - fraction) * ends_m[edge, 0] + fraction * ends_m[edge, 1])
 
 
 def _lattice(steps: int) -> Float64[np.ndarray, "K 3"]:
@@ -295,7 +295,7 @@ def _underside_m(mesh: TriMesh) -> Float64[np.ndarray, "_ 3"]:
 
 
 def _feet_m(mesh: TriMesh) -> Float64[np.ndarray, "_ 3"]:
-    """Places on what is lowest of a thing, away from edges where it has faces there."""
+    """Places on what is lowest of an object, away from edges where it has faces there."""
     corners_m = mesh.vertices_m[mesh.faces]
     normal = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
     centre_m = corners_m.mean(axis=1)

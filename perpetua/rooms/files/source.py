@@ -26,7 +26,7 @@ SCRIPT = SCRIPT_FOLDER / "scene_files" / "scene_file.py"
 # So many times rooms.max_triangles may a file have; the script thins them out to it.
 MOST_THINNED = 10
 # A floor that fills this share of its bounding rectangle is that rectangle.
-RECTANGLE_SHARE = 0.93
+RECTANGLE_FRACTION = 0.93
 # An outline follows cells drawn this many times finer, and is straightened within half a cell.
 OUTLINE_ZOOM = 4
 
@@ -134,7 +134,7 @@ def trace_floor(cells: dict[str, Any]) -> Float64[np.ndarray, "K 2"] | None:
     import cv2
 
     mask = np.array([[mark == "#" for mark in row] for row in cells["rows"]], bool)
-    if mask.mean() >= RECTANGLE_SHARE:
+    if mask.mean() >= RECTANGLE_FRACTION:
         return None
     fine = np.kron(_without_gaps(mask), np.ones((OUTLINE_ZOOM, OUTLINE_ZOOM), bool))
     outlines, _ = cv2.findContours(fine.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)

@@ -11,7 +11,7 @@ from perpetua.geometry.pinhole import inside_image, project
 from perpetua.geometry.raycast import Caster
 from perpetua.navigation.config import NavigationConfig
 from perpetua.navigation.grid import build_nav_grid
-from perpetua.report.pictures.room_views import CLEARANCE_M, CUT_SHARE, TOP, RoomViews, place_views
+from perpetua.report.pictures.room_views import CLEARANCE_M, CUT_FRACTION, TOP, RoomViews, place_views
 from perpetua.runs.preview_rooms import GalleryRequest, RoomCard, _write_page, describe_room
 from perpetua.scene.camera import CameraPath
 from perpetua.scene.room import Room
@@ -41,7 +41,7 @@ def test_the_whole_room_is_in_the_picture_from_above_and_its_ceiling_is_cut(show
     room, views = shown
     camera = views.cameras[TOP]
     corners_m = room.floor_polygon_m
-    for z_m in (0.0, CUT_SHARE * room.height_m):
+    for z_m in (0.0, CUT_FRACTION * room.height_m):
         seen = _in_camera(camera, np.column_stack([corners_m, np.full(len(corners_m), z_m)]))
         assert inside_image(camera.intrinsics, project(camera.intrinsics, seen)).all()
         assert (seen[:, 2] >= views.top_near_m - 1e-9).all()
@@ -55,7 +55,7 @@ def test_the_whole_room_is_in_the_picture_from_above_and_its_ceiling_is_cut(show
 
 def test_corner_views_are_free_apart_and_look_across(shown: tuple[Room, RoomViews]) -> None:
     room, views = shown
-    caster = Caster(join([thing.mesh for thing in room.objects]))
+    caster = Caster(join([obj.mesh for obj in room.objects]))
     eyes_m = np.array([camera.world_from_camera[0, :3, 3] for camera in views.cameras[1:]])
     assert (caster.closest_distance(eyes_m) >= CLEARANCE_M - 1e-6).all()
     assert (np.abs(eyes_m[:, :2]) < np.abs(room.floor_polygon_m).max(0)).all()

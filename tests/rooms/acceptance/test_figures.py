@@ -17,12 +17,12 @@ def _plate(x_m: tuple[float, float], y_m: tuple[float, float], z_m: float) -> Tr
 
 
 def _room(*meshes: TriMesh) -> Room:
-    things = tuple(
+    objs = tuple(
         SceneObject(k, f"thing_{k}", "floor", mesh, None, walkable=True, opaque=True)
         for k, mesh in enumerate(meshes, start=1)
     )
     square_m = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
-    return Room("test", "bedroom", square_m, 2.5, things, (), None)
+    return Room("test", "bedroom", square_m, 2.5, objs, (), None)
 
 
 FLOOR = _plate((-2.0, 2.0), (-2.0, 2.0), 0.0)
@@ -59,12 +59,12 @@ def test_any_change_of_a_room_changes_its_number() -> None:
     room = _room(FLOOR)
     moved = FLOOR.vertices_m.copy()
     moved[2, 1] = np.nextafter(moved[2, 1], 9.0)
-    thing = room.objects[0]
+    obj = room.objects[0]
     changed = [
-        replace(room, objects=(replace(thing, mesh=TriMesh(moved, FLOOR.faces)),)),
-        replace(room, objects=(replace(thing, mesh=TriMesh(FLOOR.vertices_m, FLOOR.faces[::-1].copy())),)),
-        replace(room, objects=(replace(thing, name="other"),)),
-        replace(room, objects=(replace(thing, walkable=False),)),
+        replace(room, objects=(replace(obj, mesh=TriMesh(moved, FLOOR.faces)),)),
+        replace(room, objects=(replace(obj, mesh=TriMesh(FLOOR.vertices_m, FLOOR.faces[::-1].copy())),)),
+        replace(room, objects=(replace(obj, name="other"),)),
+        replace(room, objects=(replace(obj, walkable=False),)),
         replace(room, floor_polygon_m=room.floor_polygon_m * 1.5),
     ]
     numbers = [room_sha256(each) for each in (room, *changed)]

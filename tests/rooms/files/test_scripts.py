@@ -29,9 +29,9 @@ def _box(low: tuple[float, float, float], high: tuple[float, float, float]) -> n
 
 def _room(height_m: float = 2.6) -> np.ndarray:
     """A floor slab of 5 x 4 m with its top at 0.3, four tables and a ceiling slab."""
-    things = [_box((0, 0, 0), (5, 4, 0.3)), _box((0, 0, 0.3 + height_m), (5, 4, 0.5 + height_m))]
-    things += [_box((x, y, 1.0), (x + 2, y + 1.5, 1.05)) for x in (0.2, 2.6) for y in (0.2, 2.2)]
-    return np.concatenate(things)
+    objs = [_box((0, 0, 0), (5, 4, 0.3)), _box((0, 0, 0.3 + height_m), (5, 4, 0.5 + height_m))]
+    objs += [_box((x, y, 1.0), (x + 2, y + 1.5, 1.05)) for x in (0.2, 2.6) for y in (0.2, 2.2)]
+    return np.concatenate(objs)
 
 
 @pytest.mark.parametrize("scale", [0.001, 0.01, 1.0, 39.37, 1000.0])

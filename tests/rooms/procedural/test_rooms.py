@@ -75,7 +75,7 @@ def test_every_room_has_8_to_25_pieces_of_furniture(kind: RoomKind) -> None:
 def test_rooms_are_accepted(kind: RoomKind) -> None:
     room = room_of(kind, 3)
     check_room(room, CONFIG, NavigationConfig(cell_m=0.1))
-    assert 10_000 < sum(len(thing.mesh.faces) for thing in room.objects) < 120_000
+    assert 10_000 < sum(len(obj.mesh.faces) for obj in room.objects) < 120_000
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -83,7 +83,7 @@ def test_meshes_stay_inside_the_walls(kind: RoomKind) -> None:
     """No vertex of a piece lies outside the floor polygon, whatever the shape of the room."""
     built_in = {"floor", "ceiling", "wall", "window", "door", "door_frame", "door_handle", "skirting_board"}
     for room in (room_of(kind, seed) for seed in SEEDS):
-        vertices = [thing.mesh.vertices_m for thing in room.objects if thing.category not in built_in]
+        vertices = [obj.mesh.vertices_m for obj in room.objects if obj.category not in built_in]
         corners = np.concatenate(vertices)
         # The far side of a chair's back may touch a wall: rounding is allowed for, a millimetre is not.
         outline = Outline(room.floor_polygon_m)
@@ -99,8 +99,8 @@ def _distance_to_outline(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
     distances = []
     for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
         along = end - start
-        share = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
-        distances.append(np.linalg.norm(points - start - share[:, None] * along, axis=1))
+        fraction = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
+        distances.append(np.linalg.norm(points - start - fraction[:, None] * along, axis=1))
     return np.asarray(np.min(distances, axis=0))
 
 
@@ -143,7 +143,7 @@ def test_walls_are_closed_but_for_the_windows(seed: int) -> None:
     """Rays from the middle of the room leave it through the holes of the windows and nowhere else."""
     plan, room = plan_of("livingroom", seed), room_of("livingroom", seed)
     shell = {"floor", "ceiling", "wall", "door", "door_frame"}
-    caster = Caster(join([thing.mesh for thing in room.objects if thing.category in shell]))
+    caster = Caster(join([obj.mesh for obj in room.objects if obj.category in shell]))
     turn, up = np.meshgrid(np.linspace(0.0, 2 * np.pi, 240, endpoint=False), np.linspace(-1.3, 1.3, 40))
     rays = np.stack([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)], axis=-1).reshape(-1, 3)
     start = np.array([0.0, 0.0, 1.2])
@@ -166,15 +166,15 @@ def test_seats_are_as_high_as_people_sit() -> None:
     """Most of the upward surface of each seat near the height of a knee lies 40 to 50 cm above the floor."""
     seen = set()
     for kind, seed in itertools.product(KINDS, SEEDS):
-        for thing in room_of(kind, seed).objects:
-            if thing.category in SEATS and thing.name.count("_") == 1:
-                corners = thing.mesh.vertices_m[thing.mesh.faces]
+        for obj in room_of(kind, seed).objects:
+            if obj.category in SEATS and obj.name.count("_") == 1:
+                corners = obj.mesh.vertices_m[obj.mesh.faces]
                 normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
                 up = 0.5 * np.maximum(normal[:, 2], 0.0) * (normal[:, 2] > 0.8 * np.linalg.norm(normal, axis=1))
                 height = corners[:, :, 2].mean(axis=1)
                 seat_m2 = float(up[(height > 0.39) & (height < 0.51)].sum())
-                assert seat_m2 > 0.05, (thing.name, seat_m2)
-                seen.add(thing.category)
+                assert seat_m2 > 0.05, (obj.name, seat_m2)
+                seen.add(obj.category)
     assert seen == SEATS
 
 
@@ -195,7 +195,7 @@ def test_time_of_day_settles_sky_and_lamps() -> None:
     assert not any(light.direction == (0.0, 0.0, -1.0) for light in day.lights)
     assert any(light.direction == (0.0, 0.0, -1.0) for light in night.lights)
     # What the light is like changes nothing about what stands where.
-    assert [thing.name for thing in day.objects] == [thing.name for thing in night.objects]
+    assert [obj.name for obj in day.objects] == [obj.name for obj in night.objects]
     assert all(
         np.array_equal(a.mesh.vertices_m, b.mesh.vertices_m) for a, b in zip(day.objects, night.objects, strict=True)
     )
@@ -203,7 +203,7 @@ def test_time_of_day_settles_sky_and_lamps() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_materials_are_of_the_known_patterns(kind: RoomKind) -> None:
-    materials = [thing.material for thing in room_of(kind, 1).objects]
+    materials = [obj.material for obj in room_of(kind, 1).objects]
     assert all(material is not None and material.pattern in PATTERNS for material in materials)
     colors = np.array([(m.base_color, m.second_color) for m in materials if m is not None])
     assert colors.min() >= 0.0
@@ -229,11 +229,11 @@ def test_same_seed_same_room() -> None:
 
 def _digest(room: Room) -> str:
     digest = hashlib.sha256()
-    for thing in room.objects:
-        digest.update(f"{thing.name} {thing.category} {thing.object_index}".encode())
-        digest.update(thing.mesh.vertices_m.tobytes() + thing.mesh.faces.tobytes())
-        assert thing.material is not None
-        digest.update(repr((thing.material.base_color, thing.material.pattern)).encode())
+    for obj in room.objects:
+        digest.update(f"{obj.name} {obj.category} {obj.object_index}".encode())
+        digest.update(obj.mesh.vertices_m.tobytes() + obj.mesh.faces.tobytes())
+        assert obj.material is not None
+        digest.update(repr((obj.material.base_color, obj.material.pattern)).encode())
     return digest.hexdigest()
 
 
@@ -247,6 +247,6 @@ def test_a_bench_whose_feet_lie_in_the_plane_of_the_floor_stands() -> None:
     """Rays that see one of two surfaces at one place once found this bench hanging."""
     wish = RoomWish("bathroom", (5.66, 5.43, 2.64), "evening", True)
     room = ProceduralRooms().make(wish, CONFIG, StageSeed(8, 3, "room"), 0, Path())
-    benches = [thing for thing in room.objects if thing.category == "bench"]
-    assert benches and min(thing.mesh.vertices_m[:, 2].min() for thing in benches) == 0.0
+    benches = [obj for obj in room.objects if obj.category == "bench"]
+    assert benches and min(obj.mesh.vertices_m[:, 2].min() for obj in benches) == 0.0
     assert find_faults(room.objects) == ()

@@ -117,8 +117,8 @@ def _leaves(rng: np.random.Generator, hue: float, height: int, width: int) -> Im
         dx, dy = x - bend * (base - 0.1) ** 2, y - base
         along, across = np.sin(turn) * dx + np.cos(turn) * dy, np.cos(turn) * dx - np.sin(turn) * dy
         length = 0.26 - 0.014 * index
-        share = along / length
-        canvas[(share > 0) & (share < 1) & (np.abs(across) < 0.045 * np.sin(np.pi * np.clip(share, 0, 1)))] = (
+        fraction = along / length
+        canvas[(fraction > 0) & (fraction < 1) & (np.abs(across) < 0.045 * np.sin(np.pi * np.clip(fraction, 0, 1)))] = (
             green * rng.uniform(0.8, 1.2)
         )
     return np.clip(canvas, 0.0, 1.0)

@@ -94,6 +94,6 @@ def _pillows(piece: Piece, palette: Palette) -> list[Part]:
 
 
 def _settled(mesh: TriMesh) -> TriMesh:
-    """A soft thing let down on the mattress, a little into it, and kept from the wall."""
+    """A soft object let down on the mattress, a little into it, and kept from the wall."""
     low = mesh.vertices_m.min(0)
     return moved(mesh, (0.0, max(0.0, HEAD_M - 0.01 - float(low[1])), MATTRESS_M - 0.018 - float(low[2])))

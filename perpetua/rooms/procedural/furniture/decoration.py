@@ -60,8 +60,8 @@ def build_clock(piece: Piece, palette: Palette) -> list[Part]:
         inner, outer = (0.80 - long) * radius, 0.80 * radius
         x, h = float(np.sin(angle)), float(np.cos(angle))
         marks.append(bar((inner * x, 0.86 * depth, z + inner * h), (outer * x, 0.86 * depth, z + outer * h), 0.004, 6))
-    for share, length, thick in ((piece.detail[0], 0.42, 0.006), ((12 * piece.detail[0]) % 1.0, 0.66, 0.0045)):
-        x, h = float(np.sin(2 * np.pi * share)), float(np.cos(2 * np.pi * share))
+    for fraction, length, thick in ((piece.detail[0], 0.42, 0.006), ((12 * piece.detail[0]) % 1.0, 0.66, 0.0045)):
+        x, h = float(np.sin(2 * np.pi * fraction)), float(np.cos(2 * np.pi * fraction))
         marks.append(bar((0.0, 0.9 * depth, z), (length * radius * x, 0.9 * depth, z + length * radius * h), thick, 6))
     rim = palette.black if piece.detail[1] < 0.5 else palette.wood
     return [Part("", body, rim), Part("face", face, palette.paper), Part("hands", join(marks), palette.black)]

@@ -228,7 +228,7 @@ def build_kettle(piece: Piece, palette: Palette) -> list[Part]:
         (-1.15 * radius, 0.25),
         (-0.9 * radius, 0.22),
     ]
-    grip = tube([(x, y, share * height) for x, share in arc], 0.009, 8)
+    grip = tube([(x, y, fraction * height) for x, fraction in arc], 0.009, 8)
     shell = palette.metal if piece.detail[0] < 0.5 else palette.accents[int(5 * piece.detail[1])]
     return [Part("", join([lathe([*body, *lid], (0.0, y), 24), spout]), shell), Part("grip", grip, palette.black)]
 

@@ -83,8 +83,8 @@ def _throw_pillows(piece: Piece, arm_m: float, places: int, palette: Palette) ->
     return parts
 
 
-def _pick(choices: tuple[Material, ...], share: float) -> Material:
-    return choices[int(len(choices) * share)]
+def _pick(choices: tuple[Material, ...], fraction: float) -> Material:
+    return choices[int(len(choices) * fraction)]
 
 
 def build_chair(piece: Piece, palette: Palette) -> list[Part]:
@@ -160,7 +160,7 @@ def _shell_chair(piece: Piece, palette: Palette, wood: Material) -> list[Part]:
         (0.0, height),
     ]
     widths = [0.84, 0.97, 1.0, 0.98, 0.96, 0.95, 0.72]
-    shell = _shell(profile, [half * share for share in widths])
+    shell = _shell(profile, [half * fraction for fraction in widths])
     x, stand = 0.72 * half, []
     for side in (-1.0, 1.0):
         for y0, y1 in ((0.30 * depth, 0.06 * depth), (0.68 * depth, depth - 0.03)):

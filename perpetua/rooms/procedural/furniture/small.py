@@ -1,4 +1,4 @@
-"""Small things that stand on furniture, in each piece's own frame."""
+"""Small objects that stand on furniture, in each piece's own frame."""
 
 import numpy as np
 
@@ -47,9 +47,9 @@ def build_vase(piece: Piece, palette: Palette) -> list[Part]:
 def _twigs(piece: Piece, centre: tuple[float, float], low: float, high: float, mouth: float) -> TriMesh:
     reach, meshes = 0.5 * piece.size_m[0], []
     for index in range(7):
-        angle, share = 2.4 * index, piece.detail[4 + index]
+        angle, fraction = 2.4 * index, piece.detail[4 + index]
         x, y = float(np.cos(angle)), float(np.sin(angle))
-        top, out = low + (high - low) * (0.6 + 0.4 * share), reach * (0.4 + 0.55 * share)
+        top, out = low + (high - low) * (0.6 + 0.4 * fraction), reach * (0.4 + 0.55 * fraction)
         inner = 0.4 * mouth
         path = [
             (inner * x, centre[1] + inner * y, 0.88 * low),
@@ -174,10 +174,10 @@ def build_candles(piece: Piece, palette: Palette) -> list[Part]:
         [(0.0, 0.0), (0.47 * width, 0.0), (0.5 * width, 0.012), (0.47 * width, 0.008), (0.0, 0.006)], (0.0, y), 28
     )
     wax, wicks = [], []
-    for index, share in enumerate((1.0, 0.7, 0.45)):
+    for index, fraction in enumerate((1.0, 0.7, 0.45)):
         angle = 2 * np.pi * (index / 3 + piece.detail[0])
         place = (0.24 * width * float(np.cos(angle)), y + 0.24 * width * float(np.sin(angle)))
-        top = share * (height - 0.012)
+        top = fraction * (height - 0.012)
         wax.append(post(place, 0.17 * width, 0.005, top, 18, 0.004))
         wicks.append(post(place, 0.0015, top - 0.002, top + 0.011, 6))
     return [

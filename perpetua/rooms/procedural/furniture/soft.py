@@ -1,4 +1,4 @@
-"""Cushions, pillows, blankets and curtains: closed meshes of soft things. All sizes in metres."""
+"""Cushions, pillows, blankets and curtains: closed meshes of soft objects. All sizes in metres."""
 
 from functools import lru_cache
 

@@ -206,13 +206,13 @@ class ShelfRows:
         """Fills one level from ``reach_m[0]`` on; ``detail`` settles with what, and how full."""
         x, end, turn = reach_m[0] + 0.012, reach_m[1] - 0.015, 0
         while x < end - 0.05:
-            share = (detail + 0.618034 * (turn + 1)) % 1.0
-            if share < 0.55:
-                x = self._upright(share / 0.55, x, min(end, x + 0.18 + 0.3 * share), z_m, height_m, depth_m)
-            elif share < 0.72:
-                x = self._lying(share, x, end, z_m, height_m, depth_m)
-            elif share < 0.9:
-                x = self._object(share, x, end, z_m, height_m, depth_m)
+            fraction = (detail + 0.618034 * (turn + 1)) % 1.0
+            if fraction < 0.55:
+                x = self._upright(fraction / 0.55, x, min(end, x + 0.18 + 0.3 * fraction), z_m, height_m, depth_m)
+            elif fraction < 0.72:
+                x = self._lying(fraction, x, end, z_m, height_m, depth_m)
+            elif fraction < 0.9:
+                x = self._object(fraction, x, end, z_m, height_m, depth_m)
             else:
                 x += 0.10
             x += 0.02
@@ -264,7 +264,7 @@ class ShelfRows:
 
 
 def build_wall_shelf(piece: Piece, palette: Palette) -> list[Part]:
-    """A board on brackets with a few things on it."""
+    """A board on brackets with a few objects on it."""
     width, depth, height = piece.size_m
     half, board_z = 0.5 * width, 0.16
     board = block((-half, 0.0, board_z), (half, depth, board_z + 0.025), 0.006)
@@ -316,10 +316,10 @@ def build_linen_shelf(piece: Piece, palette: Palette) -> list[Part]:
     piles: list[list[TriMesh]] = [[], [], []]
     for level, z in enumerate(heights[:-1]):
         for slot in range(2):
-            share = (piece.detail[1 + level] + 0.618034 * slot) % 1.0
-            if share < 0.75:
+            fraction = (piece.detail[1 + level] + 0.618034 * slot) % 1.0
+            if fraction < 0.75:
                 x = (slot - 0.5) * 0.48 * width
-                for fold in range(1 + int(4 * share)):
+                for fold in range(1 + int(4 * fraction)):
                     low = z + 0.024 + 0.055 * fold
                     reach = 0.19 * width
                     towel = cushion((x - reach, 0.04, low), (x + reach, depth - 0.03, low + 0.061), 6.0, (8, 7, 4))

@@ -1,4 +1,4 @@
-"""Rules that several kinds of rooms share: chairs around tables, pictures, things on surfaces."""
+"""Rules that several kinds of rooms share: chairs around tables, pictures, objects on surfaces."""
 
 import numpy as np
 
@@ -79,8 +79,8 @@ def radiators(layout: Layout) -> None:
 
 
 def decorate(layout: Layout, surface: Piece) -> None:
-    """Puts small things on a surface, spread along its width, unless something stands there already."""
-    choices = SMALL_THINGS.get(surface.category, ())
+    """Puts small objects on a surface, spread along its width, unless something stands there already."""
+    choices = SMALL_OBJECTS.get(surface.category, ())
     width, depth, _ = surface.size_m
     if not choices or _taken(layout, surface):
         return
@@ -160,7 +160,7 @@ SMALL_SIZES: dict[str, Size] = {
 LOOSE = frozenset({"books", "cup", "tray", "photo", "chopping_board", "kettle"})
 
 # The order is that from left to right.
-SMALL_THINGS: dict[str, tuple[str, ...]] = {
+SMALL_OBJECTS: dict[str, tuple[str, ...]] = {
     "coffee_table": ("books", "candles", "tray", "cup", "bowl"),
     "side_table": ("table_lamp",),
     "nightstand": ("table_lamp",),

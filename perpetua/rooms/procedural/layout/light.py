@@ -13,7 +13,7 @@ WINDOW_W_M2: dict[str, tuple[float, float]] = {"day": (40.0, 80.0), "evening": (
 WINDOW_COLOR: dict[str, Color] = {"day": (0.92, 0.97, 1.0), "evening": (1.0, 0.66, 0.45), "night": (0.5, 0.65, 1.0)}
 # Irradiance of the sun on a surface across its rays, W/m2, and how far away its disc hangs.
 SUN_W_M2: dict[str, tuple[float, float]] = {"day": (25.0, 60.0), "evening": (6.0, 14.0)}
-SUN_SHARE = 0.65
+SUN_FRACTION = 0.65
 SUN_DISTANCE_M = 14.0
 SUN_SIZE_M = 0.5
 # Power of all ceiling lamps per square metre of floor, and of one standing lamp.
@@ -40,7 +40,7 @@ def window_lights(
     """The sky's light through each window, and sometimes the sun through one of them."""
     exitance = float(rng.uniform(*WINDOW_W_M2[daytime]))
     lights = [_skylight(floor, window, exitance, WINDOW_COLOR[daytime]) for window in windows]
-    if daytime in SUN_W_M2 and rng.uniform() < SUN_SHARE:
+    if daytime in SUN_W_M2 and rng.uniform() < SUN_FRACTION:
         lights.append(_sun(rng, floor, windows[int(rng.integers(len(windows)))], daytime))
     return lights
 
@@ -94,10 +94,10 @@ def lamp_lights(rng: np.random.Generator, floor: FloorPlan, pieces: tuple[Piece,
         if piece.category in ("floor_lamp", "table_lamp"):
             top = piece.position_m[2] + piece.size_m[2]
             shade = 0.27 if piece.category == "floor_lamp" else 0.45 * piece.size_m[2]
-            share = 1.0 if piece.category == "floor_lamp" else 0.5
+            fraction = 1.0 if piece.category == "floor_lamp" else 0.5
             size = 0.5 * piece.size_m[0]
-            lights.append(_lamp(piece, top - 0.02, 1.0, size, 0.5 * share * STANDING_W, color))
-            lights.append(_lamp(piece, top - shade + 0.02, -1.0, size, 0.5 * share * STANDING_W, color))
+            lights.append(_lamp(piece, top - 0.02, 1.0, size, 0.5 * fraction * STANDING_W, color))
+            lights.append(_lamp(piece, top - shade + 0.02, -1.0, size, 0.5 * fraction * STANDING_W, color))
     return lights
 
 

@@ -43,7 +43,7 @@ def furnish_livingroom(layout: Layout) -> bool:
         layout.at_wall("basket", (0.42, 0.42, 0.46))
     if layout.chance(0.6):
         layout.at_wall("wall_shelf", (layout.between(0.8, 1.2), 0.22, 0.5), z_m=1.25, off_m=0.0)
-    _wall_things(layout, 2, sideboard, sofa)
+    _wall_objects(layout, 2, sideboard, sofa)
     return True
 
 
@@ -88,7 +88,7 @@ def _second_group(layout: Layout) -> None:
     desk_with_chair(layout)
 
 
-def _wall_things(layout: Layout, pictures: int, first: Piece | None, second: Piece | None) -> None:
+def _wall_objects(layout: Layout, pictures: int, first: Piece | None, second: Piece | None) -> None:
     hang_pictures(layout, pictures, first)
     if second is not None:
         hang_pictures(layout, 0, second)
@@ -105,7 +105,7 @@ def furnish_bedroom(layout: Layout) -> bool:
     for _ in range(2):
         stand = layout.beside(bed, "nightstand", (0.48, 0.42, 0.52), 0.06, 0.04)
         if stand is not None:
-            _nightstand_things(layout, stand)
+            _nightstand_objects(layout, stand)
     if layout.chance(0.6):
         layout.around(bed, "bench", (0.8 * wide, 0.42, 0.46), 0.0, bed.size_m[1] + 0.06, 0)
     radiators(layout)
@@ -122,15 +122,15 @@ def furnish_bedroom(layout: Layout) -> bool:
     if layout.chance(0.5):
         layout.at_wall("coat_rack", (0.8, 0.14, 1.1), z_m=0.75, off_m=0.0)
     _bedside_rug(layout, bed)
-    _wall_things(layout, 2, bed, None)
+    _wall_objects(layout, 2, bed, None)
     return True
 
 
-def _nightstand_things(layout: Layout, stand: Piece) -> None:
+def _nightstand_objects(layout: Layout, stand: Piece) -> None:
     layout.on_top(stand, "table_lamp", (0.24, 0.24, 0.42), -0.11, 0.14)
-    thing, x = ("books", 0.11) if layout.chance(0.5) else ("cup", 0.14)
-    size = (0.18, 0.13, 0.07) if thing == "books" else SMALL_SIZES[thing]
-    layout.on_top(stand, thing, size, x, 0.31, layout.between(-0.3, 0.3))
+    obj, x = ("books", 0.11) if layout.chance(0.5) else ("cup", 0.14)
+    size = (0.18, 0.13, 0.07) if obj == "books" else SMALL_SIZES[obj]
+    layout.on_top(stand, obj, size, x, 0.31, layout.between(-0.3, 0.3))
 
 
 def _reading_corner(layout: Layout) -> None:
@@ -180,7 +180,7 @@ def furnish_diningroom(layout: Layout) -> bool:
         layout.at_wall("umbrella_stand", (0.3, 0.3, 0.9))
     if layout.chance(0.6):
         layout.at_wall("wall_shelf", (layout.between(0.8, 1.3), 0.22, 0.5), z_m=1.25, off_m=0.0)
-    _wall_things(layout, 3, sideboard, None)
+    _wall_objects(layout, 3, sideboard, None)
     return True
 
 

@@ -15,7 +15,7 @@ SKIRTING_HEIGHT_M = 0.09
 SKIRTING_DEPTH_M = 0.014
 WALL_GAP_M = 0.02
 WALL_THICKNESS_M = 0.2
-# A room has at most this many pieces of furniture, not counting small things and what windows and ceilings carry.
+# A room has at most this many pieces of furniture, not counting small objects and what windows and ceilings carry.
 MAX_FURNITURE = 25
 EXTRAS = frozenset(
     {

@@ -49,9 +49,9 @@ class Layout:
         """A number from a range."""
         return float(self.rng.uniform(low, high))
 
-    def chance(self, share: float) -> bool:
+    def chance(self, fraction: float) -> bool:
         """True in this share of draws."""
-        return bool(self.rng.uniform() < share)
+        return bool(self.rng.uniform() < fraction)
 
     def _before(self, opening: Opening, depth_m: float) -> Box:
         half, wall = 0.5 * opening.width_m + 0.08, self.floor.walls[opening.wall]
@@ -90,9 +90,9 @@ class Layout:
         """Places the piece if it fits."""
         return self.add(piece) if self.fits(piece, gap_m=gap_m) else None
 
-    def put(self, thing: Piece) -> Piece | None:
-        """Places a small thing on furniture, where fronts do not count, if nothing else is in its way."""
-        return self.add(thing) if self._is_clear(thing.box(), 0.004) else None
+    def put(self, obj: Piece) -> Piece | None:
+        """Places a small object on furniture, where fronts do not count, if nothing else is in its way."""
+        return self.add(obj) if self._is_clear(obj.box(), 0.004) else None
 
     def keep_empty(self, box: Box) -> None:
         """Nothing is placed in this box from now on."""
@@ -175,7 +175,7 @@ class Layout:
     ) -> Piece | None:
         """A piece at a place of another's own frame, turned relative to it; None if it does not fit.
 
-        It shares the other's details, so that all that stands around one thing makes a set.
+        It shares the other's details, so that all that stands around one object makes a set.
         """
         position_m = (*anchor.to_world(x_m, y_m), 0.0)
         candidate = Piece(category, size_m, position_m, (anchor.quarters + quarters) % 4, anchor.detail, skew_rad)
@@ -204,7 +204,7 @@ class Layout:
     def on_top(
         self, surface: Piece, category: str, size_m: Size, x_m: float, y_m: float, skew_rad: float = 0.0
     ) -> Piece | None:
-        """A small thing standing on another piece, centred at a place of that piece's own frame, if it fits."""
+        """A small object standing on another piece, centred at a place of that piece's own frame, if it fits."""
         turn = Piece(category, size_m, (0.0, 0.0, 0.0), surface.quarters, (), skew_rad)
         off = turn.to_world(0.0, 0.5 * size_m[1])
         x, y = surface.to_world(x_m, y_m)
@@ -212,7 +212,7 @@ class Layout:
         return self.put(self.piece(category, size_m, position, surface.quarters, skew_rad))
 
     def on_wall(self, anchor: Piece, category: str, size_m: Size, z_m: float, x_m: float = 0.0) -> Piece | None:
-        """A thing on the wall behind a piece that stands at it; None where something is in the way."""
+        """An object on the wall behind a piece that stands at it; None where something is in the way."""
         x, y = anchor.to_world(x_m, -WALL_GAP_M)
         candidate = self.piece(category, size_m, (x, y, z_m), anchor.quarters)
         return None if self.is_full else self.try_add(candidate, 0.03)

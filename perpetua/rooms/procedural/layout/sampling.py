@@ -17,7 +17,7 @@ CORNER_M = 0.45
 LARGE_ROOM_M2 = 26.0
 CEILING_LAMP_M = 0.5
 # A corner is cut from this share of the rooms that stay this large.
-L_SHARE = 0.4
+L_FRACTION = 0.4
 L_MIN_AREA_M2 = 20.0
 L_MIN_ARM_M = 2.7
 
@@ -59,11 +59,11 @@ def sample_room(rng: np.random.Generator, wish: RoomWish) -> RoomPlan | None:
 def sample_floor(rng: np.random.Generator, wish: RoomWish) -> FloorPlan:
     """A rectangle, or an L where what is left is large enough and both arms are wide enough."""
     width_m, depth_m, _ = wish.size_m
-    corner, wanted = int(rng.integers(4)), rng.uniform() < L_SHARE
-    shares = rng.uniform(0.25, 0.45, size=2)
+    corner, wanted = int(rng.integers(4)), rng.uniform() < L_FRACTION
+    fractions = rng.uniform(0.25, 0.45, size=2)
     # Even corners are arrived at along y and left along x.
     sides = (depth_m, width_m) if corner % 2 == 0 else (width_m, depth_m)
-    notch = (round(float(shares[0]) * sides[0], 2), round(float(shares[1]) * sides[1], 2))
+    notch = (round(float(fractions[0]) * sides[0], 2), round(float(fractions[1]) * sides[1], 2))
     area_m2 = width_m * depth_m - notch[0] * notch[1]
     arms_m = (sides[0] - notch[0], sides[1] - notch[1])
     if wanted and area_m2 >= L_MIN_AREA_M2 and min(arms_m) >= L_MIN_ARM_M:

@@ -78,11 +78,11 @@ def _above_counter(layout: Layout, counter: Piece) -> None:
 
 
 def _on_counter(layout: Layout, counter: Piece) -> None:
-    """Things on the worktop, away from hob and sink."""
+    """Objects on the worktop, away from hob and sink."""
     free = [k for k in range(modules(counter)) if k not in (hob_module(counter), sink_module(counter))]
-    things = ("kettle", "chopping_board", "bottles", "small_plant", "bowl")
-    for module, index in zip(free, layout.rng.permutation(len(things)), strict=False):
-        name = things[int(index)]
+    objs = ("kettle", "chopping_board", "bottles", "small_plant", "bowl")
+    for module, index in zip(free, layout.rng.permutation(len(objs)), strict=False):
+        name = objs[int(index)]
         layout.on_top(counter, name, SMALL_SIZES[name], module_x_m(counter, module), 0.3, layout.between(-0.4, 0.4))
     hob_x = module_x_m(counter, hob_module(counter))
     if layout.chance(0.6):
