@@ -20,6 +20,7 @@ from perpetua.geometry.raycast import Caster
 from perpetua.motion.actions import known_actions
 from perpetua.motion.config import MotionConfig
 from perpetua.motion.plan import make_motions
+from perpetua.navigation.seat_measure import measure_seat
 from perpetua.scene.actor import ActorMesh, Dwell, Route
 from perpetua.scene.room import Material, Room, SceneObject
 from perpetua.seeding import StageSeed
@@ -44,19 +45,19 @@ def box(low_m: tuple[float, float, float], high_m: tuple[float, float, float]) -
 
 def stage_room(seat_m: float | None = None) -> Room:
     """A bare floor, with a shelf to point at, and a chair at x = 0 that faces +X where ``seat_m`` is its height."""
-    things = [
+    objects = [
         ("floor", box((-30.0, -30.0, -0.1), (30.0, 30.0, 0.0))),
         ("shelf", box((1.6, -1.6, 0.0), (2.4, -1.3, 1.9))),
     ]
     if seat_m is not None:
         chair = [box((-0.22, -0.23, 0.0), (0.24, 0.23, seat_m)), box((-0.25, -0.23, 0.0), (-0.22, 0.23, seat_m + 0.45))]
-        things[1] = ("chair", join(chair))
-    objects = tuple(
+        objects[1] = ("chair", join(chair))
+    built = tuple(
         SceneObject(index, f"{category}_{index}", category, mesh, GREY, category == "floor", True)
-        for index, (category, mesh) in enumerate(things, start=1)
+        for index, (category, mesh) in enumerate(objects, start=1)
     )
     corners_m = np.array([[-30.0, -30.0], [30.0, -30.0], [30.0, 30.0], [-30.0, 30.0]])
-    return Room("stage", "livingroom", corners_m, 2.8, objects, (), None)
+    return Room("stage", "livingroom", corners_m, 2.8, built, (), None)
 
 
 def straight(speed_mps: float, seconds: float, words: str) -> Route:
@@ -66,10 +67,11 @@ def straight(speed_mps: float, seconds: float, words: str) -> Route:
     return Route(0, position_m, np.zeros(len(time_s)), words)
 
 
-def sitting_route(seat_m: float, seconds: float) -> Route:
+def sitting_route(room: Room, seat_m: float, seconds: float) -> Route:
     """Standing half a metre in front of a chair, sitting down on it, and standing up."""
     route = straight(0.0, seconds, "sits down")
-    dwell = Dwell(8, len(route.heading_rad) - 8, "sit", 2, (0.0, 0.0, seat_m))
+    seat = measure_seat(2, (0.0, 0.0, seat_m), 0.0, 0.0, Caster(join([obj.mesh for obj in room.objects])))
+    dwell = Dwell(8, len(route.heading_rad) - 8, "sit", 2, seat.middle_m, seat)
     return replace(route, position_m=route.position_m + np.array([0.52, 0.0, 0.0]), dwells=(dwell,))
 
 
@@ -156,7 +158,7 @@ def seat_strips(bodies: tuple[Body, ...]) -> list[np.ndarray]:
     rows = []
     for index, seat_m in enumerate((0.40, 0.44, 0.50, 0.55)):
         room = stage_room(seat_m)
-        mesh = animate(bodies[index % len(bodies)], sitting_route(seat_m, 8.0), room, 70 + index)
+        mesh = animate(bodies[index % len(bodies)], sitting_route(room, seat_m, 8.0), room, 70 + index)
         rows.append(strip(f"seat {seat_m} m", mesh, room, [10, 36, 50, 90, 146, 170], -1.35, fixed=True))
         rows.append(strip(f"seat {seat_m} m", mesh, room, [10, 36, 50, 90, 146, 170], -0.3, fixed=True))
     return rows

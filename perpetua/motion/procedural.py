@@ -23,16 +23,14 @@ from perpetua.motion.kinematics import bone, joint_index
 from perpetua.motion.legs import SIDES, foot_of, leg_of, pelvis_heights_m, solve_leg
 from perpetua.motion.path import RoutePath
 from perpetua.motion.rotations import about_y, about_z, blend, rotate
-from perpetua.motion.sitting import (
-    Sitting,
+from perpetua.motion.sitting import Sitting, plan_sittings, without_failed_sits
+from perpetua.motion.sitting_motion import (
     lowered_pelvis,
     pelvis_tilt_rad,
-    plan_sittings,
     raised_heels,
     seated_weight,
     sitting_lean_rad,
     stepped_back,
-    without_failed_sits,
 )
 from perpetua.motion.style import GaitStyle, draw_gait_style
 from perpetua.motion.swing_avoidance import low_obstacles, steered

@@ -9,6 +9,8 @@ from scipy.ndimage import maximum_filter
 
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.raycast import Caster
+from perpetua.navigation.seat_measure import measure_seat
+from perpetua.scene.actor import Seat
 from perpetua.scene.room import Room, SceneObject
 
 # What people sit on; a mattress or a cushion may be the top of it.
@@ -48,21 +50,8 @@ _BACKREST_M, _ARM_REST_M = 0.15, 0.34
 _NEAREST_BACK_M, _FARTHEST_BACK_M = 0.15, 0.6
 _SPACING_M = 0.6
 _PER_OBJECT = 3
-# Every so manyth cell is tried.
+# One cell in five is tried.
 _EVERY = 5
-
-
-@dataclass(frozen=True)
-class Seat:
-    """A place to sit: ``middle_m`` under the sitter's hips on the surface, ``facing_rad`` where the sitter looks.
-
-    ``height_m`` is the height of the surface above the floor.
-    """
-
-    object_index: int
-    middle_m: tuple[float, float, float]
-    facing_rad: float
-    height_m: float
 
 
 @dataclass(frozen=True)
@@ -96,7 +85,7 @@ class _Candidates:
 
 
 def find_seats(room: Room) -> tuple[Seat, ...]:
-    """Seats of a room, in the order of its objects: at most three per object, at least 0.6 m apart."""
+    """Seats of a room, measured, in the order of its objects: at most three per object, at least 0.6 m apart."""
     sittable = [obj for obj in room.objects if obj.category in SEAT_CATEGORIES and len(obj.mesh.faces) > 0]
     if not sittable:
         return ()
@@ -105,7 +94,11 @@ def find_seats(room: Room) -> tuple[Seat, ...]:
     floor_m = float(np.median([_floor_m(obj.mesh) for obj in room.objects if obj.walkable] or [0.0]))
     seats: list[Seat] = []
     for obj in sittable:
-        seats += _seats_of(obj, _relief(obj, caster, owner_of_face, floor_m, room.height_m), floor_m, seats)
+        relief = _relief(obj, caster, owner_of_face, floor_m, room.height_m)
+        seats += [
+            measure_seat(obj.object_index, place.middle_m, place.facing_rad, floor_m, caster)
+            for place in _places_on(obj, relief, floor_m, [seat.middle_m for seat in seats])
+        ]
     return tuple(seats)
 
 
@@ -132,7 +125,17 @@ def _relief(
     return _Relief(low, heights[1], maximum_filter(heights[1], 3), tall_m, owner)
 
 
-def _seats_of(obj: SceneObject, relief: _Relief, floor_m: float, taken: list[Seat]) -> list[Seat]:
+@dataclass(frozen=True)
+class _Place:
+    """Where somebody can sit, and facing which way."""
+
+    middle_m: tuple[float, float, float]
+    facing_rad: float
+
+
+def _places_on(
+    obj: SceneObject, relief: _Relief, floor_m: float, taken_m: list[tuple[float, float, float]]
+) -> list[_Place]:
     mine = (relief.owner == obj.object_index) & (relief.low_m >= LOWEST_M) & (relief.low_m <= HIGHEST_M)
     cell = np.argwhere(mine)[::_EVERY]
     if len(cell) == 0:
@@ -141,14 +144,15 @@ def _seats_of(obj: SceneObject, relief: _Relief, floor_m: float, taken: list[Sea
     corners = cv2.minAreaRect(obj.mesh.vertices_m[:, :2].astype(np.float32))
     first_rad = float(np.radians(corners[2]))
     tried = [_candidates(middle_m, relief, first_rad + quarter * 0.5 * np.pi) for quarter in range(4)]
-    found: list[Seat] = []
+    found: list[_Place] = []
     order = sorted((float(cost), way, place) for way, some in enumerate(tried) for place, cost in enumerate(some.cost))
     for _, way, place in order:
         x_m, y_m, height_m = (float(value) for value in tried[way].middle_m[place])
-        apart_m = [np.hypot(seat.middle_m[0] - x_m, seat.middle_m[1] - y_m) for seat in (*taken, *found)]
+        others_m = (*taken_m, *(other.middle_m for other in found))
+        apart_m = [np.hypot(other_m[0] - x_m, other_m[1] - y_m) for other_m in others_m]
         if len(found) < _PER_OBJECT and all(distance_m >= _SPACING_M for distance_m in apart_m):
             facing_rad = (tried[way].facing_rad + np.pi) % (2.0 * np.pi) - np.pi
-            found.append(Seat(obj.object_index, (x_m, y_m, height_m + floor_m), float(facing_rad), height_m))
+            found.append(_Place((x_m, y_m, height_m + floor_m), float(facing_rad)))
     return found
 
 

@@ -6,6 +6,8 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64
 from scipy import ndimage
 
+from perpetua.scene.actor import Seat
+
 
 @dataclass(frozen=True)
 class NavGrid:
@@ -35,7 +37,7 @@ class Spot:
     """A place worth a pause: where one stands, which way one faces, and what for.
 
     ``purpose`` is "look" (at ``target_m``), "stand" (at a worktop, ``target_m`` on it) or "sit" (with the back to
-    the seat, ``target_m`` its middle). ``object_index`` is what it is about.
+    the ``seat``, ``target_m`` its middle). ``object_index`` is what it is about.
     """
 
     place_m: tuple[float, float]
@@ -43,3 +45,4 @@ class Spot:
     purpose: str
     object_index: int
     target_m: tuple[float, float, float]
+    seat: Seat | None = None

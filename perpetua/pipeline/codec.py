@@ -18,7 +18,7 @@ from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.io.files import load_json
 from perpetua.navigation.types import NavGrid
-from perpetua.scene.actor import ActorMesh, ActorPart, BodyMotion, Dwell, Route
+from perpetua.scene.actor import ActorMesh, ActorPart, BodyMotion, Dwell, Route, Seat
 from perpetua.scene.camera import CameraPath
 from perpetua.scene.filmed import RenderedView
 from perpetua.scene.room import AreaLight, Material, Room, SceneObject, Sky
@@ -32,7 +32,7 @@ STORED_TYPES = {
     stored.__name__: stored
     for stored in (
         ActorMesh, ActorPart, AreaLight, BodyMotion, CameraPath, Dwell, Intrinsics, Material, NavGrid, PointTracks,
-        RenderedView, Room, Route, SceneObject, SequenceTracks, Sky, SightReport, TriMesh, ViewTracks,
+        RenderedView, Room, Route, SceneObject, Seat, SequenceTracks, Sky, SightReport, TriMesh, ViewTracks,
     )
 }  # fmt: skip
 

@@ -10,7 +10,7 @@ from perpetua.config import Config
 from perpetua.geometry.mesh import TriMesh
 from perpetua.machine.version import __version__
 from perpetua.pipeline.store import library_versions
-from perpetua.scene.actor import ActorMesh, Route
+from perpetua.scene.actor import ActorMesh, Dwell, Route
 from perpetua.scene.room import Room, SceneObject
 from perpetua.seeding import StageSeed
 
@@ -34,7 +34,7 @@ def sequence_record(
             "actor": actor.actor,
             "description": actor.description,
             "action": route.description,
-            "dwells": [asdict(dwell) for dwell in route.dwells],
+            "dwells": [_dwell_entry(dwell) for dwell in route.dwells],
             "route_m": np.round(route.position_m, 4).tolist(),
             "heading_rad": np.round(route.heading_rad, 4).tolist(),
         }
@@ -54,6 +54,11 @@ def sequence_record(
         "versions": library_versions(),
         "licences": LICENCES,
     }
+
+
+def _dwell_entry(dwell: Dwell) -> dict[str, Any]:
+    """A pause without the measures of its seat, which motion alone needs."""
+    return {name: value for name, value in asdict(dwell).items() if name != "seat"}
 
 
 def _object_entry(obj: SceneObject) -> dict[str, Any]:

@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Float64
 
 from perpetua.navigation.floor import WalkableFloor
-from perpetua.navigation.seats import Seat
 from perpetua.navigation.time_parametrisation import Walk
 from perpetua.navigation.types import Spot
 from perpetua.navigation.walks import SEAT_WAY_M, Manner, random_walk
 from perpetua.routes.casting import Role
 from perpetua.routes.config import RoutesConfig
+from perpetua.scene.actor import Seat
 from perpetua.seeding import StageSeed
 
 # Of this many walks, the one that keeps clear of the other actors best and gets its pace is taken.
@@ -49,7 +49,7 @@ def seat_spots(seats: tuple[Seat, ...], floor: WalkableFloor) -> tuple[Spot, ...
         place_m = floor.points_m[floor.nearest(wanted_m)]
         if np.linalg.norm(place_m - wanted_m) <= SEAT_TOLERANCE_M:
             place = (float(place_m[0]), float(place_m[1]))
-            spots.append(Spot(place, seat.facing_rad, "sit", seat.object_index, seat.middle_m))
+            spots.append(Spot(place, seat.facing_rad, "sit", seat.object_index, seat.middle_m, seat))
     return tuple(spots)
 
 

@@ -107,4 +107,4 @@ def _dwell(pause: Pause, frames: int, refinement: int) -> list[Dwell]:
     """A pause in frames; none if no two frames fall into it."""
     first, last = math.ceil(pause.first_step / refinement), min(pause.last_step // refinement, frames - 1)
     spot = pause.spot
-    return [Dwell(first, last, spot.purpose, spot.object_index, spot.target_m)] if last > first else []
+    return [Dwell(first, last, spot.purpose, spot.object_index, spot.target_m, spot.seat)] if last > first else []

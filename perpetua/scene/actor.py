@@ -22,11 +22,29 @@ PACES = ("stand", "stroll", "walk", "brisk", "jog")
 
 
 @dataclass(frozen=True)
+class Seat:
+    """A place to sit, measured in the direction ``facing_rad`` in which the sitter looks.
+
+    ``middle_m`` is on the surface under the sitter's hips, ``height_m`` its height above the floor. ``top_m`` is the
+    height in the world of the highest place under hips and thighs. ``edge_m`` is how far ahead of the middle the
+    surface ends. ``backs_m`` are pairs of a height above ``top_m`` and the distance to what is behind the middle there.
+    """
+
+    object_index: int
+    middle_m: tuple[float, float, float]
+    facing_rad: float
+    height_m: float
+    top_m: float
+    edge_m: float
+    backs_m: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
 class Dwell:
     """A pause on a route, from ``first_frame`` to ``last_frame``, both included.
 
     ``purpose`` is "look" (at ``target_m``), "stand" (at a table, ``target_m`` on it) or "sit" (the route stands in
-    front of the seat with its back to it; ``target_m`` is the middle of the seat). ``object_index`` is what it is
+    front of the seat with its back to it; ``target_m`` is the middle of the ``seat``). ``object_index`` is what it is
     about; None for nothing in particular.
     """
 
@@ -35,6 +53,7 @@ class Dwell:
     purpose: str
     object_index: int | None
     target_m: tuple[float, float, float]
+    seat: Seat | None = None
 
 
 @dataclass(frozen=True)

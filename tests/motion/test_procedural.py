@@ -6,13 +6,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from perpetua.geometry.mesh import TriMesh
+from perpetua.geometry.mesh import TriMesh, join
+from perpetua.geometry.raycast import Caster
 from perpetua.motion.action_timeline import draw_timeline
 from perpetua.motion.actions import read_description
 from perpetua.motion.arm_avoidance import clear_arms
 from perpetua.motion.config import MotionConfig
 from perpetua.motion.kinematics import contact_positions, joint_index, joint_positions
 from perpetua.motion.procedural import ProceduralMotion
+from perpetua.navigation.seat_measure import measure_seat
 from perpetua.scene.actor import BodyMotion, Dwell, Route
 from perpetua.scene.room import Room, SceneObject
 from perpetua.seeding import StageSeed
@@ -24,11 +26,11 @@ SKELETON = sample_skeleton()
 SEAT_M = 0.44
 
 
-def _with(*things: tuple[str, TriMesh, bool]) -> Room:
+def _with(*objects: tuple[str, TriMesh, bool]) -> Room:
     room = empty_room()
     more = tuple(
         SceneObject(index, category, category, mesh, GREY, walkable, True)
-        for index, (category, mesh, walkable) in enumerate(things, start=2)
+        for index, (category, mesh, walkable) in enumerate(objects, start=2)
     )
     return replace(room, objects=(*room.objects, *more))
 
@@ -76,11 +78,18 @@ def test_joggers_bend_their_elbows_and_lean_forward() -> None:
     assert np.all(trunk_m[:, 0] > 0.03)
 
 
+def _sit(room: Room, seat_m: float, last: int) -> Dwell:
+    """Sitting on the middle of the world, at a height, from frame 6 on."""
+    caster = Caster(join([obj.mesh for obj in room.objects]))
+    seat = measure_seat(2, (0.0, 0.0, seat_m), 0.0, 0.0, caster)
+    return Dwell(6, last, "sit", 2, seat.middle_m, seat)
+
+
 @cache
 def _sitter() -> BodyMotion:
     seat = tri(box((0.5, 0.5, SEAT_M), (0.0, 0.0, 0.5 * SEAT_M)))
-    sit = Dwell(6, 185, "sit", 2, (0.0, 0.0, SEAT_M))
-    return _make(_standing(8.0, "sits down", sit, x_m=0.52), _with(("chair", seat, False)))
+    room = _with(("chair", seat, False))
+    return _make(_standing(8.0, "sits down", _sit(room, SEAT_M, 185), x_m=0.52), room)
 
 
 def test_a_sitter_rests_its_hips_on_the_seat_with_planted_feet_and_stands_up_again() -> None:
@@ -101,12 +110,26 @@ def test_a_sitter_rests_its_hips_on_the_seat_with_planted_feet_and_stands_up_aga
 
 @pytest.mark.parametrize(("seat_m", "last", "table"), [(0.44, 50, False), (0.75, 185, False), (0.44, 185, True)])
 def test_without_time_or_room_an_actor_stays_on_its_feet(seat_m: float, last: int, table: bool) -> None:
-    things = [("chair", tri(box((0.5, 0.5, seat_m), (0.0, 0.0, 0.5 * seat_m))), False)]
+    objects = [("chair", tri(box((0.5, 0.5, seat_m), (0.0, 0.0, 0.5 * seat_m))), False)]
     if table:
-        things.append(("table", tri(box((0.3, 1.0, 0.5), (0.68, 0.0, 0.25))), False))
-    sit = Dwell(6, last, "sit", 2, (0.0, 0.0, seat_m))
-    motion = _make(_standing(8.0, "sits down", sit, x_m=0.5), _with(*things))
+        objects.append(("table", tri(box((0.3, 1.0, 0.5), (0.68, 0.0, 0.25))), False))
+    room = _with(*objects)
+    motion = _make(_standing(8.0, "sits down", _sit(room, seat_m, last), x_m=0.5), room)
     assert motion.pelvis_m[:, 2].min() > 0.85
+
+
+def test_a_sitter_faces_as_its_seat_was_measured_whichever_way_the_route_leaves_it() -> None:
+    room = _with(("chair", tri(box((0.5, 0.5, SEAT_M), (0.0, 0.0, 0.5 * SEAT_M))), False))
+    sit = _sit(room, SEAT_M, 185)
+    assert sit.seat is not None
+    turned_rad = 0.1
+    motion = _make(
+        _standing(8.0, "sits down", replace(sit, seat=replace(sit.seat, facing_rad=turned_rad)), x_m=0.52), room
+    )
+    left = motion.world_from_joint[96, 0, :, 1]
+    assert abs(np.arctan2(-left[0], left[1]) - turned_rad) < 0.02
+    unmeasured = _make(_standing(8.0, "sits down", replace(sit, seat=None), x_m=0.52), room)
+    assert unmeasured.pelvis_m[:, 2].min() > 0.85, "nobody sits on what was not measured"
 
 
 def test_soles_stand_on_the_rug_or_the_floor_that_is_under_them() -> None:

@@ -38,6 +38,17 @@ def test_a_chair_is_sat_on_in_its_middle_facing_away_from_its_back(turn_rad: flo
     assert abs(np.angle(np.exp(1j * (seat.facing_rad - turn_rad)))) < 0.05
 
 
+@pytest.mark.parametrize("turn_rad", [0.0, 1.9])
+def test_a_seat_says_where_its_edge_is_and_how_far_behind_its_back(turn_rad: float) -> None:
+    (seat,) = find_seats(_room(("chair", _chair(turn_rad))))
+    assert abs(seat.top_m - 0.45) < 1e-3
+    ahead = np.array([np.cos(turn_rad), np.sin(turn_rad)])
+    forward_m = float((np.array(seat.middle_m[:2]) - [0.0, 0.5]) @ ahead)
+    assert abs(seat.edge_m - (0.225 - forward_m)) < 0.012, "to the next centimetre"
+    for level_m, distance_m in seat.backs_m:
+        assert abs(distance_m - (0.201 + forward_m)) < 0.01 or level_m > 0.5
+
+
 @pytest.mark.parametrize(
     "blocker",
     [
