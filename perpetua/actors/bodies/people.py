@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from perpetua.actors.base.base_mesh import Traits
-from perpetua.actors.bodies.hair import STYLES, HairStyle
+from perpetua.actors.bodies.hair_styles import STYLES, HairStyle
 from perpetua.actors.bodies.skin import Complexion
 from perpetua.actors.clothing.outfit import Outfit, draw_outfit
 from perpetua.actors.config import ActorsConfig

@@ -22,8 +22,8 @@ from perpetua.actors.bodies.smplx_model import (
 )
 from perpetua.actors.bodies.source import Body
 from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb, weave
+from perpetua.actors.clothing.garments import DYES
 from perpetua.actors.clothing.mhmat import load_image
-from perpetua.actors.clothing.outfit import DYES
 from perpetua.actors.config import ActorsConfig, SmplxConfig
 from perpetua.errors import AssetError
 from perpetua.machine.assets import asset_folder

@@ -9,7 +9,9 @@ from perpetua.actors.base.base_mesh import base_mesh
 from perpetua.actors.base.piece import Piece
 from perpetua.actors.base.rig import base_weights
 from perpetua.actors.base.wearer import Wearer
+from perpetua.actors.clothing import garments
 from perpetua.actors.clothing.fabrics import Fabric, weave
+from perpetua.actors.clothing.garments import DYES
 from perpetua.actors.clothing.patterns import (
     SkirtPattern,
     TopPattern,
@@ -24,85 +26,12 @@ from perpetua.actors.clothing.socks import make_socks, sock_field_m
 from perpetua.actors.clothing.tailor import sew_skirt, sew_top, sew_trousers
 from perpetua.seeding import StageSeed
 
-Colour = tuple[float, float, float]
-
-# Linear RGB of dyes, by the names used in descriptions.
-DYES: dict[str, Colour] = {
-    "white": (0.72, 0.71, 0.68),
-    "cream": (0.66, 0.58, 0.42),
-    "grey": (0.20, 0.21, 0.22),
-    "charcoal": (0.035, 0.037, 0.042),
-    "navy": (0.012, 0.022, 0.075),
-    "blue": (0.035, 0.13, 0.40),
-    "sky": (0.26, 0.45, 0.66),
-    "teal": (0.012, 0.17, 0.18),
-    "green": (0.035, 0.16, 0.055),
-    "olive": (0.11, 0.115, 0.035),
-    "mustard": (0.55, 0.30, 0.025),
-    "orange": (0.60, 0.16, 0.025),
-    "red": (0.42, 0.025, 0.030),
-    "burgundy": (0.12, 0.010, 0.022),
-    "pink": (0.60, 0.24, 0.29),
-    "purple": (0.13, 0.045, 0.23),
-    "brown": (0.13, 0.060, 0.028),
-    "beige": (0.46, 0.35, 0.23),
-}
-_TOP_DYES = ("white", "teal", "red", "navy", "mustard", "green", "pink", "sky", "burgundy", "orange", "purple", "grey")
-_LEG_DYES = ("navy", "charcoal", "beige", "olive", "grey", "brown")
-_TOPS: dict[str, TopPattern] = {
-    "T-shirt": TopPattern(0.160, 0.010, 0.055, False, "band", 0.013, 0.0025),
-    "V-neck T-shirt": TopPattern(0.150, 0.015, 0.110, True, "none", 0.012, 0.0025),
-    "polo shirt": TopPattern(0.165, 0.005, 0.060, False, "polo", 0.013, 0.0025, buttons_to_z_m=0.385),
-    "shirt": TopPattern(0.462, -0.010, 0.058, False, "shirt", 0.015, 0.0020, 0.009, 0.0, 0.000, True),
-    "jumper": TopPattern(0.470, 0.025, 0.050, False, "band", 0.019, 0.0050, 0.010),
-    "long-sleeved top": TopPattern(0.455, 0.015, 0.070, False, "band", 0.012, 0.0025),
-}
-_JACKETS: dict[str, TopPattern] = {
-    "jacket": TopPattern(0.470, -0.030, 0.075, False, "none", 0.024, 0.0060, 0.009, 0.040),
-    "cardigan": TopPattern(0.468, -0.050, 0.150, True, "none", 0.022, 0.0050, 0.009, 0.028),
-}
-# What a jacket may be worn over, and how often one is.
-_UNDER_JACKETS, _JACKET_FRACTION = ("T-shirt", "V-neck T-shirt"), 0.6
-_JACKET_FABRICS = {"jacket": ("plain", "denim", "heather", "checks"), "cardigan": ("knit",)}
-_JACKET_DYES = ("navy", "charcoal", "olive", "beige", "brown", "grey", "burgundy")
-_BODICES = (
-    TopPattern(0.110, 0.085, 0.075, False, "none", 0.007, 0.0025, 0.003),
-    TopPattern(0.145, 0.085, 0.115, True, "none", 0.007, 0.0025, 0.003),
-    TopPattern(0.400, 0.085, 0.060, False, "none", 0.007, 0.0025, 0.004),
-)
-_DRESS_SKIRT = SkirtPattern(0.125, -0.400, 0.004, 0.003)
-_DRESS_FABRICS = ("print", "dots", "plain", "checks", "stripes")
-_DRESS_FRACTION = 0.3
-_TOP_FABRICS: dict[str, tuple[str, ...]] = {
-    "T-shirt": ("stripes", "plain", "print", "heather"),
-    "V-neck T-shirt": ("plain", "stripes", "dots", "print"),
-    "polo shirt": ("stripes", "plain"),
-    "shirt": ("checks", "gingham", "denim", "dots", "stripes"),
-    "jumper": ("knit",),
-    "long-sleeved top": ("stripes", "heather", "print"),
-}
-_BOTTOMS: dict[str, TrouserPattern | SkirtPattern] = {
-    "jeans": TrouserPattern(0.125, 0.842, 0.009, 0.018, 0.003, 0.0055, True),
-    "slim trousers": TrouserPattern(0.130, 0.836, 0.008, 0.014, 0.003, 0.0045, True),
-    "loose trousers": TrouserPattern(0.130, 0.845, 0.012, 0.026, 0.003, 0.0075),
-    "shorts": TrouserPattern(0.125, 0.375, 0.012, 0.028, 0.003, 0.006, True),
-    "skirt": SkirtPattern(0.090, -0.380, 0.003, 0.003),
-}
-_BOTTOM_FABRICS: dict[str, tuple[str, ...]] = {
-    "jeans": ("denim",),
-    "slim trousers": ("plain",),
-    "loose trousers": ("plain", "heather"),
-    "shorts": ("plain", "denim"),
-    "skirt": ("plain", "checks", "denim", "print"),
-}
-_MEN_WEAR = ("jeans", "slim trousers", "jeans", "loose trousers", "shorts", "loose trousers")
-_WOMEN_WEAR = ("jeans", "slim trousers", "skirt", "jeans", "loose trousers", "skirt", "shorts")
-_SHOES = ("trainers", "runners", "leather shoes")
+# How often what may go under a jacket does, and a woman wears a dress.
+_JACKET_FRACTION, _DRESS_FRACTION = 0.6, 0.3
 # How far socks reach above the floor under trousers, and with bare legs.
 _LONG_SOCK_M, _SHORT_SOCK_M = 0.20, 0.125
 # Socks lie on the skin: they hide it but for a rim this much narrower than that of other clothes.
 _SOCK_GRIP_M = 0.020
-_SOCK_DYES = ("white", "grey", "charcoal", "navy", "white")
 
 
 @dataclass(frozen=True)
@@ -148,51 +77,65 @@ def _draw_shoes(kind: str, rng: np.random.Generator) -> ShoePattern:
     if kind == "leather shoes":
         upper = DYES[_pick(("brown", "charcoal"), rng)]
         return ShoePattern(
-            "leather", 0.016, 2.4, 0.075, upper, (0.8 * upper[0], 0.8 * upper[1], 0.8 * upper[2]), DYES["charcoal"]
+            kind="leather",
+            sole_m=0.016,
+            toe=2.4,
+            shaft_m=0.075,
+            upper=upper,
+            accent=(0.8 * upper[0], 0.8 * upper[1], 0.8 * upper[2]),
+            sole=DYES["charcoal"],
         )
-    upper, accent = DYES[_pick(("white", "navy", "grey", "charcoal", "red"), rng)], DYES[_pick(_TOP_DYES, rng)]
+    upper, accent = DYES[_pick(("white", "navy", "grey", "charcoal", "red"), rng)], DYES[_pick(garments.TOP_DYES, rng)]
     sole = DYES["white"] if kind == "trainers" else DYES[_pick(("white", "grey"), rng)]
-    return ShoePattern("runner" if kind == "runners" else "canvas", 0.024, 2.2, 0.080, upper, accent, sole)
+    return ShoePattern(
+        kind="runner" if kind == "runners" else "canvas",
+        sole_m=0.024,
+        toe=2.2,
+        shaft_m=0.080,
+        upper=upper,
+        accent=accent,
+        sole=sole,
+    )
 
 
 def draw_outfit(actor: int, female: bool, seed: StageSeed) -> Outfit:
     """Clothes of one actor; kinds of top and their colours take turns within a room."""
     room, rng = seed.stream("outfits"), seed.stream("outfit", actor)
-    tops = tuple(_TOPS)
+    tops = tuple(garments.TOPS)
     top = tops[int(room.permutation(len(tops))[actor % len(tops)])]
-    dye = _TOP_DYES[int(room.permutation(len(_TOP_DYES))[actor % len(_TOP_DYES)])]
-    other = _pick(tuple(name for name in _TOP_DYES if name != dye), rng)
-    shoes = _pick(_SHOES, rng)
-    jacket = _pick(tuple(_JACKETS), rng)
-    jacket_cloth = Cloth(_pick(_JACKET_FABRICS[jacket], rng), _pick(_JACKET_DYES, rng), "beige")
+    dye = garments.TOP_DYES[int(room.permutation(len(garments.TOP_DYES))[actor % len(garments.TOP_DYES)])]
+    other = _pick(tuple(name for name in garments.TOP_DYES if name != dye), rng)
+    shoes = _pick(garments.SHOES, rng)
+    jacket = _pick(tuple(garments.JACKETS), rng)
+    jacket_cloth = Cloth(_pick(garments.JACKET_FABRICS[jacket], rng), _pick(garments.JACKET_DYES, rng), "beige")
     lower: TrouserPattern | SkirtPattern
-    wears_jacket = top in _UNDER_JACKETS and rng.random() < _JACKET_FRACTION
+    wears_jacket = top in garments.UNDER_JACKETS and rng.random() < _JACKET_FRACTION
     over = f" under a {jacket_cloth.base} {jacket_cloth.fabric} {jacket}" if wears_jacket else ""
     if female and rng.random() < _DRESS_FRACTION:
-        cloth = Cloth(_pick(_DRESS_FABRICS, rng), dye, other)
-        bodice = _BODICES[int(rng.integers(len(_BODICES)))]
-        upper, lower, lower_cloth = bodice, _DRESS_SKIRT, cloth
+        cloth = Cloth(_pick(garments.DRESS_FABRICS, rng), dye, other)
+        bodice = garments.BODICES[int(rng.integers(len(garments.BODICES)))]
+        upper, lower, lower_cloth = bodice, garments.DRESS_SKIRT, cloth
         words = f"a {dye} {cloth.fabric} dress{over}"
     else:
-        cloth = Cloth(_pick(_TOP_FABRICS[top], rng), dye, other)
-        legs = _pick(_WOMEN_WEAR if female else _MEN_WEAR, rng)
-        colour = "navy" if legs == "jeans" else _pick(_LEG_DYES, rng)
-        lower_cloth = Cloth(_pick(_BOTTOM_FABRICS[legs], rng), colour, "white")
-        upper, lower = _TOPS[top], _BOTTOMS[legs]
+        cloth = Cloth(_pick(garments.TOP_FABRICS[top], rng), dye, other)
+        legs = _pick(garments.WOMEN_WEAR if female else garments.MEN_WEAR, rng)
+        colour = "navy" if legs == "jeans" else _pick(garments.LEG_DYES, rng)
+        lower_cloth = Cloth(_pick(garments.BOTTOM_FABRICS[legs], rng), colour, "white")
+        upper, lower = garments.TOPS[top], garments.BOTTOMS[legs]
         below = f"a {colour} skirt" if legs == "skirt" else f"{colour} {legs}"
         words = f"a {dye} {cloth.fabric} {top}{over}, {below}"
     bare = isinstance(lower, SkirtPattern)
-    sock_m = 0.0 if bare else _SHORT_SOCK_M if lower is _BOTTOMS["shorts"] else _LONG_SOCK_M
+    sock_m = 0.0 if bare else _SHORT_SOCK_M if lower is garments.BOTTOMS["shorts"] else _LONG_SOCK_M
     return Outfit(
         upper,
         cloth,
         lower,
         lower_cloth,
-        _JACKETS[jacket] if wears_jacket else None,
+        garments.JACKETS[jacket] if wears_jacket else None,
         jacket_cloth,
         _draw_shoes(shoes, rng),
         sock_m,
-        Cloth("knit", _pick(_SOCK_DYES, rng), "grey"),
+        Cloth("knit", _pick(garments.SOCK_DYES, rng), "grey"),
         _in_plain_words(f"{words} and {shoes}"),
         actor,
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from perpetua.actors.base.base_mesh import base_mesh
+from perpetua.actors.base.base_mesh import BODY_VERTEX_COUNT, base_mesh
 from perpetua.actors.base.piece import Piece
 from perpetua.actors.base.rig import BONE_COUNT, base_weights, joint_index, rest_joints
 from perpetua.actors.base.wearer import Wearer
@@ -15,7 +15,6 @@ from perpetua.scene.room import Material
 
 _SECTIONS = 26
 _ARCH = 15
-_BODY_VERTICES = 13380
 
 
 @dataclass(frozen=True)
@@ -68,8 +67,8 @@ def _measure(wearer: Wearer, side: str, pattern: ShoePattern) -> _Last:
     joints = rest_joints(wearer.vertices_m)
     ankle, ball = joints[joint_index(f"{side}_ankle")], joints[joint_index(f"{side}_foot")]
     columns = [joint_index(f"{side}_ankle"), joint_index(f"{side}_foot")]
-    foot = base_weights()[:_BODY_VERTICES, columns].sum(axis=1) > 0.5
-    points = wearer.vertices_m[:_BODY_VERTICES][foot]
+    foot = base_weights()[:BODY_VERTEX_COUNT, columns].sum(axis=1) > 0.5
+    points = wearer.vertices_m[:BODY_VERTEX_COUNT][foot]
     forward = (ball - ankle) * np.array([1.0, 1.0, 0.0])
     forward /= np.linalg.norm(forward)
     left = np.array([-forward[1], forward[0], 0.0])
@@ -235,5 +234,5 @@ def make_shoes(wearer: Wearer, pattern: ShoePattern, rng: np.random.Generator) -
 
 def shoe_field_m(pattern: ShoePattern, template_m: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, " P"]:
     """Metres below the edge of the shoes on the base mesh."""
-    floor_z_m = float(base_mesh().vertices_m[:_BODY_VERTICES, 2].min())
+    floor_z_m = float(base_mesh().vertices_m[:BODY_VERTEX_COUNT, 2].min())
     return np.asarray(floor_z_m + pattern.shaft_m - template_m[:, 2])

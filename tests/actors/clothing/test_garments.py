@@ -10,7 +10,8 @@ from perpetua.actors.base.piece import Piece
 from perpetua.actors.base.rig import base_weights
 from perpetua.actors.base.surface import triangles, vertex_normals
 from perpetua.actors.base.wearer import Wearer
-from perpetua.actors.bodies.hair import STYLES, make_hair
+from perpetua.actors.bodies.hair import make_hair
+from perpetua.actors.bodies.hair_styles import STYLES
 from perpetua.actors.clothing.fabrics import FABRICS, weave
 from perpetua.actors.clothing.outfit import DYES, Dressed, draw_outfit, dress
 from perpetua.actors.clothing.patterns import TopPattern, covered_by, top_field_m
