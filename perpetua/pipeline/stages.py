@@ -325,13 +325,13 @@ STAGES = (
     Stage(
         30,
         "routes",
-        4,
+        5,
         ("room", "navigation"),
         _route_settings,
         _routes,
         redraw=_every_time,
     ),
-    Stage(40, "motion", 3, ("room", "routes"), _motion_settings, _motion),
+    Stage(40, "motion", 4, ("room", "routes"), _motion_settings, _motion),
     Stage(50, "actors", 3, ("room", "routes", "motion"), _body_settings, _actors),
     Stage(
         60,
