@@ -31,7 +31,7 @@ def assets() -> None:
 @click.command(short_help="Check this machine and say what to install.")
 @OUT_OPTION
 def doctor(out: Path) -> None:
-    """Check this machine and say what to install. Exit code 1 if something needed is missing."""
+    """Check this machine and say what to install; list plug-ins. Exit code 1 if something needed is missing."""
     from perpetua.machine.doctor import examine
 
     findings = examine(out)
@@ -39,10 +39,22 @@ def doctor(out: Path) -> None:
     for finding in findings:
         table.add_row(finding.subject, finding.state, finding.value, finding.remedy)
     wide_console().print(table)
+    _print_plug_ins()
     missing = [finding for finding in findings if finding.state == "missing"]
     for finding in missing:
         click.echo(f"{finding.subject} is missing: {finding.remedy}")
     sys.exit(1 if missing else 0)
+
+
+def _print_plug_ins() -> None:
+    """What installed packages add; nothing if they add nothing. A broken one is no fault of the machine."""
+    from perpetua.config.plugins import installed_plug_ins
+
+    table = Table("plug-in for", "name", "package", "what to do")
+    for plug_in in installed_plug_ins():
+        table.add_row(plug_in.kind, plug_in.name, plug_in.package, plug_in.fault)
+    if table.row_count:
+        wide_console().print(table)
 
 
 @click.command("config", short_help="Print every setting with its meaning, unit and range.")
@@ -57,10 +69,11 @@ def show_config(preset: str, config_path: Path | None, assignments: tuple[str, .
     The same --preset, --config and --set as for generate. `perpetua config > mine.yaml` is a start for a file of
     your own; a file may name just the settings that it changes.
     """
+    from perpetua.config.plugins import setting_notes
     from perpetua.config.reference import annotated_yaml, markdown_page
 
     config = load_config(preset, config_path, assignments)
-    click.echo(annotated_yaml(config) if form == "yaml" else markdown_page(config))
+    click.echo(annotated_yaml(config, setting_notes()) if form == "yaml" else markdown_page(config))
 
 
 @click.command(short_help="Print a script that completes commands in a shell.")

@@ -1,7 +1,7 @@
 """All settings with their meanings, for people: as YAML that can be read again, and as Markdown tables."""
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -19,20 +19,28 @@ _TABLE_HEAD = ("| setting | default | allowed | meaning |", "|---|---|---|---|")
 _SIGNS = {"Ge": "≥", "Gt": ">", "Le": "≤", "Lt": "<"}
 
 
-def annotated_yaml(config: Config) -> str:
-    """Every setting as YAML, each with its meaning and range as a comment."""
-    return "\n".join(_annotated_lines(config, ""))
+def annotated_yaml(config: Config, notes: Mapping[str, str] | None = None) -> str:
+    """Every setting as YAML, each with its meaning and range as a comment.
+
+    Args:
+        config: the values.
+        notes: what is added to the comments of settings, by their names ``a.b``.
+    """
+    return "\n".join(_annotated_lines(config, "", notes or {}))
 
 
-def _annotated_lines(section: Section, indent: str) -> list[str]:
+def _annotated_lines(section: Section, title: str, notes: Mapping[str, str]) -> list[str]:
     lines: list[str] = []
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
+        path = f"{title}.{name}" if title else name
+        indent = "  " * path.count(".")
         if isinstance(value, Section):
-            lines += [f"{indent}{name}:", *_annotated_lines(value, indent + "  ")]
+            lines += [f"{indent}{name}:", *_annotated_lines(value, path, notes)]
         else:
             limits = allowed(field)
             comment = f"{field.description}" + (f" [{limits}]" if limits else "")
+            comment += f"; {notes[path]}" if path in notes else ""
             lines.append(f"{indent}{name}: {_written(section, name)}  # {comment}")
     return lines
 

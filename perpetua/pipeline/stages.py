@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from perpetua.actors.bodies.assembly import assemble_actors, draw_bodies, measured_skeletons
-from perpetua.actors.bodies.source import Body
+from perpetua.actors.bodies.source import BODY_MODELS, Body
 from perpetua.actors.bodies.user_files import body_listing
 from perpetua.actors.checks.validation import validate_actors
 from perpetua.actors.config import ActorsConfig
@@ -22,9 +22,11 @@ from perpetua.formats.tapvid_mv import write_sequence
 from perpetua.io.files import read_json, write_json
 from perpetua.motion.plan import make_motions
 from perpetua.motion.recorded.clips import clip_listing
+from perpetua.motion.source import MOTION_SOURCES
 from perpetua.navigation.grid import build_nav_grid
 from perpetua.navigation.types import NavGrid
 from perpetua.pipeline.record import sequence_record
+from perpetua.registry import Registry
 from perpetua.rendering.bake import BAKE_SCRIPT
 from perpetua.rendering.config import PROCESS_SETTINGS
 from perpetua.rendering.render import BAKED_FOLDER, RENDER_SCRIPT, render_views
@@ -32,6 +34,7 @@ from perpetua.rooms.acceptance.build import build_room
 from perpetua.rooms.files.checks import scene_digests
 from perpetua.rooms.files.source import SCRIPT as SCENE_FILE_SCRIPT
 from perpetua.rooms.infinigen import SCRIPT as INFINIGEN_SCRIPT
+from perpetua.rooms.source import ROOM_SOURCES
 from perpetua.routes.casting import action_descriptions
 from perpetua.routes.plan import plan_routes
 from perpetua.scene.actor import ActorMesh, BodyMotion, Route
@@ -140,9 +143,15 @@ def _settings(*names: str) -> Callable[[Config], dict[str, Any]]:
     return pick
 
 
+def _plug_in_settings(*chosen: tuple[Registry[Any], str]) -> dict[str, Any]:
+    """What a plug-in makes changes with its package; what comes with Perpetua counts by the stage's version."""
+    packages = {registry.kind: registry.package(name) for registry, name in chosen}
+    return {f"package of {kind}": package for kind, package in packages.items() if package is not None}
+
+
 def _room_settings(config: Config) -> dict[str, Any]:
     """A scene file counts by its content, not by its name alone."""
-    settings = _settings("rooms", "navigation")(config)
+    settings = {**_settings("rooms", "navigation")(config), **_plug_in_settings((ROOM_SOURCES, config.rooms.source))}
     if config.rooms.source == "file":
         settings["scenes"] = scene_digests(config.rooms.file.path)
     return settings
@@ -180,7 +189,9 @@ def _route_settings(config: Config) -> dict[str, Any]:
 
 def _body_settings(config: Config) -> dict[str, Any]:
     """Folders of clothes and of body models count by what is in them."""
-    return {**_settings("actors", _FPS)(config), "bodies": body_listing(config.actors)}
+    actors = config.actors
+    packages = _plug_in_settings((BODY_MODELS, actors.body), (MOTION_SOURCES, actors.motion.source))
+    return {**_settings("actors", _FPS)(config), "bodies": body_listing(actors), **packages}
 
 
 def _motion_settings(config: Config) -> dict[str, Any]:
