@@ -12,11 +12,11 @@ from scipy.spatial import KDTree
 
 from perpetua.geometry.mesh import TriMesh
 
-# Distances beyond this are not told apart.
+# Larger distances are given as this one.
 FAR_M = 1.0
-# FCL measures solids; these are as thin as a point and a line for our purpose.
+# FCL measures solids: points are spheres and lines are cylinders of this radius.
 THIN_M = 1e-3
-# The longest edge of a moving mesh is looked for in every n-th frame, and taken to be this much longer.
+# The longest edge of a moving mesh is measured in every 24th frame, and multiplied by this factor.
 EDGE_FRAMES, EDGE_SLACK = 24, 1.25
 
 
@@ -30,7 +30,7 @@ def pillars_to_mesh_m(
     feet_m: Float64[np.ndarray, "N 3"], low_m: float, high_m: float, mesh: TriMesh
 ) -> Float64[np.ndarray, " N"]:
     """Distance of upright lines from ``low_m`` to ``high_m`` above each foot point to the nearest triangle."""
-    # What is stepped over or hangs above the head is no obstacle, however near.
+    # Triangles low enough to step over, or above the head, are no obstacles.
     height_m = mesh.vertices_m[mesh.faces][:, :, 2]
     beside = (height_m.max(axis=1) > feet_m[:, 2].min() + low_m) & (height_m.min(axis=1) < feet_m[:, 2].max() + high_m)
     near = _near(TriMesh(mesh.vertices_m, mesh.faces[beside]), feet_m, (0, 1))
@@ -39,7 +39,7 @@ def pillars_to_mesh_m(
 
 
 def _near(mesh: TriMesh, way_m: Float64[np.ndarray, "N 3"], axes: tuple[int, ...]) -> TriMesh:
-    """The triangles that may come within ``FAR_M`` of the way, measured along these axes."""
+    """The triangles that may be within ``FAR_M`` of the positions, measured along these axes."""
     corners_m = mesh.vertices_m[mesh.faces][:, :, axes]
     middle_m = corners_m.mean(axis=1)
     reach_m = np.linalg.norm(corners_m - middle_m[:, None], axis=2).max(axis=1, initial=0.0)
@@ -62,7 +62,7 @@ def _distances_m(
     scene, body = fcl.CollisionObject(model), fcl.CollisionObject(shape)
     for index, place_m in enumerate(places_m):
         body.setTranslation(place_m)
-        # FCL's answer is -1 where they overlap.
+        # FCL returns -1 where they overlap.
         found_m = fcl.distance(body, scene, fcl.DistanceRequest(), fcl.DistanceResult())
         distance_m[index] = min(FAR_M, max(0.0, found_m + THIN_M if found_m > 0 else 0.0))
     return distance_m
@@ -98,7 +98,7 @@ def points_to_moving_mesh_m(
 
 
 def _longest_edge_m(vertices_m: Float32[np.ndarray, "T P 3"], faces: Int32[np.ndarray, "F 3"]) -> float:
-    """No edge is longer at any time: bodies do not stretch by the slack between the frames looked at."""
+    """An upper bound of the edges at all times: bodies do not stretch by the slack between the measured frames."""
     longest_m = 0.0
     for placed_m in vertices_m[::EDGE_FRAMES]:
         corners_m = placed_m[faces]
@@ -112,7 +112,10 @@ def _to_triangles_m(
     faces: Int32[np.ndarray, "F 3"],
     longest_m: float,
 ) -> float:
-    """A triangle is no nearer than its nearest corner less its longest edge, so only few have to be measured."""
+    """Distance of a point to the nearest triangle.
+
+    A triangle is no nearer than its nearest corner less its longest edge, so only few have to be measured.
+    """
     offset_m = vertices_m - point_m
     to_vertex_m = np.sqrt(np.einsum("pc,pc->p", offset_m, offset_m))
     least_m = to_vertex_m.min()

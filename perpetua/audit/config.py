@@ -6,7 +6,11 @@ from perpetua.io.section import Section
 
 
 class AuditConfig(Section):
-    """What a finished sequence must satisfy."""
+    """What a finished sequence must satisfy.
+
+    Bounds that the planners or the format have too, such as ``moving_m``, are the audit's own, so that it stays
+    independent of the code whose output it checks.
+    """
 
     reprojection_px: float = Field(1e-3, gt=0.0, description="largest error of a query's pixel, pixels")
     depth_agreement: float = Field(

@@ -1,4 +1,4 @@
-"""Checks that several files tell one story: views of each other, labels of tracks, images of geometry."""
+"""Checks that files agree with each other: views with views, labels with tracks."""
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
@@ -11,17 +11,17 @@ from perpetua.audit.report import Check
 from perpetua.audit.tally import Tally, check_of, chosen_frames
 from perpetua.audit.visibility_checks import AROUND
 
-# About so many pixels along each side are looked at in other views.
+# About this many pixels along each side of an image are tested in the other views.
 LOOKED_AT_PX = 128
-# What labels at the pixel centres around a track may differ from what it does itself.
+# Largest difference between a track and the labels at the pixel centres around it.
 MOVES_M, MOVES_FRACTION = 0.01, 0.2
 FLOWS_PX, FLOWS_FRACTION = 0.5, 0.1
 TURNED_COSINE = 0.7
 
 
 def check_views_agree(files: SequenceFiles, bounds: AuditConfig) -> Check:
-    """No view sees through a surface that another one shows: a pixel's point, by its depth, lies nowhere before what
-    other views show in its direction."""
+    """No view sees through a surface that another view shows: the point that a pixel's depth gives is never nearer to
+    another camera than the surface which that camera shows in the point's direction."""
     through = Tally("shows a surface that another view sees through", 1.0 - bounds.seen_through)
     for view in files.views:
         for frame in chosen_frames(len(files.arrays[f"{view}/depth.npy"])):
@@ -41,7 +41,7 @@ def check_views_agree(files: SequenceFiles, bounds: AuditConfig) -> Check:
 def _before_surfaces(
     files: SequenceFiles, view: str, frame: int, world_m: Float64[np.ndarray, "H W 3"], bounds: AuditConfig
 ) -> tuple[Bool[np.ndarray, "H W"], Bool[np.ndarray, "H W"]]:
-    """Which points lie before what a view shows in their direction, and which of them it looks at."""
+    """Which points are nearer than the surface that a view shows there, and which of them project into the view."""
     intrinsics = files.arrays[f"{view}/intrinsics.npy"]
     camera = intrinsics, files.arrays[f"{view}/extrinsics_w2c.npy"][frame]
     seen = project_to_pixels(*camera, world_m.reshape(-1, 3)).reshape(world_m.shape)
@@ -53,7 +53,7 @@ def _before_surfaces(
 
 
 def check_index_of_tracks(files: SequenceFiles, owner: Int64[np.ndarray, " P"]) -> Check:
-    """Of the pixel centres around a visible track one shows its object."""
+    """At least one of the pixel centres around a visible track shows the track's object."""
     shown = Tally("is visible, and object_index.npy shows other objects in all pixels around", 0.999)
     for view in files.views:
         visibility, index = files.arrays[f"{view}/visibility.npy"], files.arrays[f"{view}/object_index.npy"]
@@ -65,7 +65,7 @@ def check_index_of_tracks(files: SequenceFiles, owner: Int64[np.ndarray, " P"]) 
 
 
 def check_labels_of_tracks(files: SequenceFiles) -> list[Check]:
-    """Where a track is visible, labels around it say of its surface what the track itself does."""
+    """Where a track is visible, the normals and the flow at the pixels around it agree with the track's own."""
     tallies = {
         "normals": Tally("has other normals around it than its triangle in surface_xyz.npy", 0.85),
         "scene flow": Tally("has another scene flow around it than its own way", 0.95),
@@ -119,10 +119,10 @@ def _flows_alike(
     constant: float,
     fraction: float,
 ) -> Bool[np.ndarray, " P"]:
-    """Whether a label around a track is about the track's own vector; true where the track has none."""
+    """Whether a label around a track is close to the track's own vector; true where the track has none."""
     around, on_image = _labels_around(files, view, frame, flow)
     length = np.linalg.norm(own, axis=1)
-    # Around a point the flow of its surface differs as far as the labels around it differ among themselves.
+    # The flow of a surface varies near a point by as much as the labels around the point differ from each other.
     spread = np.linalg.norm(around.max(axis=1) - around.min(axis=1), axis=1)
     off = np.linalg.norm(around - own[:, None], axis=2)
     alike = off <= (constant + fraction * length + spread)[:, None]

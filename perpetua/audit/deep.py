@@ -136,36 +136,43 @@ def verify_deep(
         frames: how many frames are looked at, at even distances.
     """
     rays = SceneRays(scene)
-    depth = Tally("differs from what a ray at the meshes meets", bounds.deep_agreement)
-    objects = Tally("differs from what a ray at the meshes meets", bounds.deep_agreement)
-    sight = Tally("differs from what a ray at the meshes says", bounds.deep_visibility)
+    words = "differs from what a ray at the meshes meets"
+    depth, objects = Tally(words, bounds.deep_agreement), Tally(words, bounds.deep_agreement)
+    visibility = Tally("differs from what a ray at the meshes says", bounds.deep_visibility)
     total = len(files.arrays["tracks_xyz.npy"])
     chosen = np.unique(np.linspace(0, total - 1, frames).round().astype(int)).tolist()
     for frame in chosen:
-        for number, view in enumerate(files.views):
+        for view in files.views:
             predicted_m, owner = predict_image(files, rays, view, frame)
             clear = off_silhouettes(predicted_m, owner)
             rendered_m = np.asarray(files.of_view(int(view), "depth.npy")[frame], np.float64)
             allowed_m = bounds.deep_depth_m + bounds.deep_depth_share * predicted_m
             depth.add(f"{view}/depth.npy[{frame}", np.abs(rendered_m - predicted_m) > allowed_m, clear)
-            if scene.object_index is None:
-                on_actor = np.isin(owner, [actor.object_index for actor in scene.actors])
-                foreground = files.of_view(int(view), "foreground_mask.npy")[frame]
-                objects.add(f"{view}/foreground_mask.npy[{frame}", on_actor != foreground, clear)
-            else:
-                objects.add(f"object index of view {view}[{frame}", owner != scene.object_index[number][frame], clear)
+            name, differs = _other_object(files, rays, view, frame, owner)
+            objects.add(name, differs, clear)
             seen = _evidence(files, table, rays, view, frame, owner, predicted_m)
             visible = np.asarray(files.of_view(int(view), "visibility.npy")[frame])
             # Entries off the image count: calling them visible would be wrong. What no pixel around shows, or none at
             # the point's depth, is hidden by the format's rule.
             wrong = np.where(seen.plain, visible != seen.reached, visible & ~(seen.reached & seen.shown))
-            sight.add(f"{view}/visibility.npy[{frame}", wrong)
+            visibility.add(f"{view}/visibility.npy[{frame}", wrong)
     return [
         check_of("depth by rays", [depth]),
         check_of("objects by rays", [objects]),
-        check_of("visibility by rays", [sight]),
+        check_of("visibility by rays", [visibility]),
         check_on_meshes(files, table, scene, bounds, chosen),
     ]
+
+
+def _other_object(
+    files: SequenceFiles, rays: SceneRays, view: str, frame: int, owner: Int64[np.ndarray, "H W"]
+) -> tuple[str, Bool[np.ndarray, "H W"]]:
+    """The name of what is compared, and the pixels where it differs from ``owner``, the objects that rays meet: the
+    object index, or the mask of the actors where there is no index."""
+    if rays.scene.object_index is not None:
+        return f"object index of view {view}[{frame}", owner != rays.scene.object_index[int(view)][frame]
+    on_actor = np.isin(owner, [actor.object_index for actor in rays.scene.actors])
+    return f"{view}/foreground_mask.npy[{frame}", on_actor != files.of_view(int(view), "foreground_mask.npy")[frame]
 
 
 def predict_image(

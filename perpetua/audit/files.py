@@ -1,4 +1,8 @@
-"""Finds and loads the files of a sequence, and checks their names, types and shapes. Shares no code with the writer."""
+"""Finds and loads the files of a sequence, and checks their names, types and shapes.
+
+The names repeat ``perpetua.formats.layout`` on purpose: the audit shares no code with the writer, so a file that the
+writer misnames is found.
+"""
 
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -15,11 +15,11 @@ from perpetua.audit.tally import Tally, check_of, chosen_frames
 from perpetua.audit.visibility_checks import AROUND, SHARP
 
 NONE, SEEN, HIDDEN, OUTSIDE = range(4)
-# Flow agrees with depth and cameras up to this, and what so many metres of depth make of pixels.
+# Flow agrees with depth and cameras within this many pixels, plus the pixels that this error of depth causes.
 FLOW_PX, DEPTH_M = 0.02, 5e-4
-# Rounding may put a place this far over the border of an image.
+# Rounding may move a point this far across the border of an image.
 BORDER_PX = 1e-3
-# Depth around a place is a plane's when its inverse bends by less than this share.
+# Depth around a point is planar when its inverse bends by less than this fraction.
 BEND = 5e-4
 
 
@@ -95,7 +95,7 @@ def world_of_pixels(files: SequenceFiles, view: str, frame: int) -> Float64[np.n
 
 
 class _Rules:
-    """What is asked of every flow."""
+    """The rules that every flow must keep."""
 
     def __init__(self, bounds: AuditConfig) -> None:
         self.bounds = bounds
@@ -187,7 +187,7 @@ def depth_around(
 
 
 def check_scene_flow(files: SequenceFiles, bounds: AuditConfig) -> Check:
-    """Scene flow is 0 but on actors, and takes no point before the surfaces that the next frame shows."""
+    """Scene flow is 0 except on actors, and moves no point in front of the surfaces that the next frame shows."""
     still = Tally("moves, and foreground_mask.npy shows no actor", 1.0)
     through = Tally("ends before the surface that depth.npy shows in the next frame", 0.98)
     for view in files.views:

@@ -10,18 +10,18 @@ from perpetua.audit.geometry import unproject_depth
 from perpetua.audit.report import Check
 from perpetua.audit.tally import Tally, check_of, chosen_frames
 
-# Of the pixels that show something so many have a label; silhouettes may have none.
+# Fraction of the pixels with a surface that must have a label; pixels on silhouettes may have none.
 LABELLED = 0.99
 UNIT_ERROR = 1e-5
-# Pixels with one normal whose depth says plane lie on one plane, up to this share of the depth.
+# Pixels with equal normals and planar depth lie on one plane, within this fraction of the depth.
 FLAT_FRACTION = 1e-4
 SAME_NORMAL = 1.0 - 1e-7
-# Of the inverse of depth.
+# Depth is planar where its inverse bends by less than this fraction.
 LINEAR = 2e-5
 
 
 def check_object_index(files: SequenceFiles) -> Check:
-    """The index names objects of the record, actors just where the mask is, and something just where depth is."""
+    """The index names objects of the record, actors exactly where the mask is set, none exactly where depth is 0."""
     listed = [int(obj["object_index"]) for obj in (files.record or {}).get("objects", [])]
     unknown = Tally("is an object that sequence.json does not list", 1.0)
     people = Tally("is an actor or not, and foreground_mask.npy says otherwise", 1.0)
@@ -68,8 +68,8 @@ def _rows_off_plane(
     normal: Float64[np.ndarray, "H W 3"],
     point_m: Float64[np.ndarray, "H W 3"],
 ) -> Iterator[tuple[Bool[np.ndarray, "*shape"], Bool[np.ndarray, "*shape"]]]:
-    """For each three pixels in a row, and in a column: whether the way from the first to the last leaves the plane that
-    the middle one's normal stands on, and whether it should not: one object and normal, and depth that says plane."""
+    """For each three pixels in a row, and in a column: whether the line from the first to the last leaves the plane of
+    the middle one's normal, and whether that is tested: all show one object, equal normals and planar depth."""
     index = files.arrays.get(f"{view}/object_index.npy")
     owner = np.zeros(normal.shape[:2]) if index is None else np.asarray(index[frame])
     for axis in (0, 1):

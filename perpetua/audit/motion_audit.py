@@ -1,4 +1,4 @@
-"""Whether people and cameras kept off everything and were seen: measured from meshes, by code that plans nothing.
+"""Whether people and cameras kept their distance and people were seen: measured on meshes, by code that plans nothing.
 
 Distances are exact (``perpetua.audit.clearance``) and taken at four times the frame rate, with straight lines between
 frames. Speeds are differences between frames.
@@ -68,7 +68,7 @@ class MotionAudit:
         return all(check.passed for check in self.checks)
 
     def to_json(self) -> dict[str, Any]:
-        """Checks, summary and curves as JSON values, curves to a tenth of a millimetre or the like."""
+        """Checks, summary and curves as JSON values, curves rounded to four digits."""
         curves = {name: np.round(getattr(self, name), 4).tolist() for name in self.curve_names()}
         return {"passed": self.passed, "checks": [vars(check) for check in self.checks], "curves": curves} | {
             "focus_seen_share": self.focus_seen.mean(axis=1).tolist(),
@@ -94,11 +94,11 @@ def audit_motion(
     """Measures a sequence's motion against the true triangles.
 
     Args:
-        room: its meshes are what nobody may touch; what is walkable, actors may.
-        routes: where the actors' axes go.
+        room: its meshes are the obstacles, except for actors those that are walkable.
+        routes: positions of the actors' axes.
         actors: their posed meshes, which cameras keep away from.
         cameras: one path per view.
-        focus: whom each view is to show.
+        focus: the actors that each view should show.
         fps: frames per second.
         limits: the rules.
     """
@@ -137,7 +137,7 @@ def _checks(curves: dict[str, Float64[np.ndarray, "_ T"]], limits: MotionLimits)
 
 
 def _at_least(name: str, who: str, curve_m: Float64[np.ndarray, "_ T"], limit_m: float) -> Check:
-    # Distances beyond FAR_M are not told apart.
+    # Distances are cut at FAR_M, so a larger limit cannot be tested.
     limit_m = min(limit_m, FAR_M)
     index, frame = np.unravel_index(int(curve_m.argmin()), curve_m.shape)
     value_m = float(curve_m[index, frame])
@@ -164,7 +164,7 @@ def _between(way_m: Float64[np.ndarray, "T 3"], time: Float64[np.ndarray, " N"])
 
 
 def _least_per_frame(values: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " T"]:
-    """Of each frame and its sub-steps up to the next frame the least; the last frame stands for itself."""
+    """The least value of each frame and its sub-steps before the next frame; the last frame has no sub-steps."""
     return np.append(values[:-1].reshape(-1, SUBSTEPS).min(axis=1), values[-1])
 
 

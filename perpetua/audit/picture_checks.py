@@ -1,4 +1,4 @@
-"""Checks that images belong where they are: tracks keep their colours from image to image and from view to view.
+"""Checks that images are in the right place: tracks keep their colours from image to image and from view to view.
 
 The colour of a track is the median over the images of a view that show it. An image that was put at another frame shows
 other colours at that frame's tracks, and the image that belongs there shows the right ones.
@@ -18,10 +18,10 @@ from perpetua.audit.report import Check
 TRACKS = 1024
 # Fewer visible tracks say nothing about an image.
 FEWEST = 24
-# Another image fits a frame better when its colours are off by less than this share of the own image's, and by at least
-# so much less; colours are natural logarithms.
+# Another image fits a frame better when its colour error is less than this fraction of the own image's error, and
+# smaller by at least this much; colours are natural logarithms.
 BETTER_FRACTION, BETTER_BY = 0.55, 0.01
-# Two views' images belong to each other when the colours of common tracks correlate by so much more that way.
+# Two views' images are exchanged when the colours of common tracks correlate by this much more after an exchange.
 BETTER_CORRELATION = 0.4
 
 
@@ -36,7 +36,7 @@ class _View:
 
 
 def check_pictures(files: SequenceFiles) -> Check:
-    """No image fits another frame of its view much better than the image that is there, nor another view's frames."""
+    """No image fits another frame of its view, or another view, much better than the image that is there."""
     faults: list[str] = []
     worst = 0.0
     views = [_look(files, view) for view in files.views]
@@ -69,7 +69,7 @@ def _colours(
     pixel_px: Float32[np.ndarray, "F P 2"],
     visible: Bool[np.ndarray, "F P"],
 ) -> Float64[np.ndarray, "P 3"]:
-    """What images show of tracks where they are visible, in the median; NaN for tracks that never are."""
+    """Median colour of each track over the images in which it is visible; NaN for tracks that never are."""
     shown = np.full((*visible.shape, 3), np.nan, np.float32)
     for frame, jpeg in enumerate(jpegs):
         at = np.flatnonzero(visible[frame])
@@ -81,8 +81,8 @@ def _colours(
 
 
 def _errors(files: SequenceFiles, view: _View) -> Float64[np.ndarray, "F F"]:
-    """How far colours of an image (first axis) are from the colours of the tracks visible at a frame, in the median
-    and apart from its brightness."""
+    """Median distance between the colours of an image (first axis) and those of the tracks visible at a frame, after
+    the image's brightness is removed."""
     frame, track = np.nonzero(view.visible)
     ends = np.cumsum(view.visible.sum(axis=1))[:-1]
     error = np.full((len(view.visible), len(view.visible)), np.inf)
@@ -95,7 +95,7 @@ def _errors(files: SequenceFiles, view: _View) -> Float64[np.ndarray, "F F"]:
 
 
 def _exchanged(files: SequenceFiles, views: list[_View]) -> list[str]:
-    """Pairs of views whose images fit much better the other way round."""
+    """Pairs of views whose images fit much better when exchanged."""
     faults = []
     for place, first in enumerate(views):
         for second in views[place + 1 :]:
@@ -115,7 +115,7 @@ def _exchanged(files: SequenceFiles, views: list[_View]) -> list[str]:
 
 
 def _correlation(first: Float64[np.ndarray, "P 3"], second: Float64[np.ndarray, "P 3"]) -> float | None:
-    """Of the colours of tracks that both views see; None where too few are, or they are all alike."""
+    """Correlation of the colours of tracks that both views see; None where these are too few, or all alike."""
     both = np.isfinite(first).all(axis=1) & np.isfinite(second).all(axis=1)
     seen = np.stack([first[both].ravel(), second[both].ravel()])
     if both.sum() < FEWEST or (seen.std(axis=1) < 0.1).any():
@@ -128,7 +128,7 @@ def _decode(jpeg: UInt8[np.ndarray, " _"]) -> Float32[np.ndarray, "H W 3"]:
 
 
 def _sample(image: Float32[np.ndarray, "H W 3"], pixel_px: Float32[np.ndarray, "N 2"]) -> Float32[np.ndarray, "N 3"]:
-    """Colours between pixel centres; OpenCV takes at most 32,767 places to a row."""
+    """Colours interpolated between pixel centres; OpenCV takes at most 32,767 points in a row."""
     if len(pixel_px) == 0:
         return np.zeros((0, 3), np.float32)
     columns = [part for start in range(0, len(pixel_px), 16_384) for part in [pixel_px[start : start + 16_384]]]

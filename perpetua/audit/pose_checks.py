@@ -9,12 +9,12 @@ from perpetua.audit.files import RECORD_FILE, SequenceFiles
 from perpetua.audit.geometry import project_to_pixels
 from perpetua.audit.report import Check
 
-# What single precision leaves open of a place in a room, metres: it decides pixels of points close before a camera.
+# Rounding error of a position in a room in single precision, metres: it matters for points close to a camera.
 PLACE_M = 2e-6
 
 
 def check_track_pixels(files: SequenceFiles, bounds: AuditConfig) -> Check:
-    """``tracks_xy.npy`` holds the projections of the tracks, and NaN just for points behind the camera."""
+    """``tracks_xy.npy`` holds the projections of the tracks, and NaN exactly for points behind the camera."""
     tracks = files.arrays["tracks_xyz.npy"]
     worst, detail = 0.0, ""
     for view in files.views:
@@ -37,14 +37,14 @@ def check_track_pixels(files: SequenceFiles, bounds: AuditConfig) -> Check:
 
 
 def _unsure_px(intrinsics: Float64[np.ndarray, "4"], seen: Float64[np.ndarray, "P 3"]) -> Float64[np.ndarray, " P"]:
-    """How far a pixel moves when its point does by ``PLACE_M``."""
+    """Distance that a pixel moves when its point moves by ``PLACE_M``."""
     focal_px = float(intrinsics[:2].max())
     off_axis = np.abs(seen[:, :2] - intrinsics[2:]).max(axis=1) / focal_px
     return np.nan_to_num(focal_px * PLACE_M * (1.0 + off_axis) / np.abs(seen[:, 2]), nan=np.inf)
 
 
 def check_poses(files: SequenceFiles, on_actor: Bool[np.ndarray, " P"], bounds: AuditConfig) -> Check:
-    """Poses are rigid, those of objects that are no actors constant; each track lies in the box of its object."""
+    """Poses are rigid, and constant for objects that are not actors; each track lies in the box of its object."""
     assert files.record is not None
     poses, boxes = files.arrays["object_poses.npy"], files.arrays["object_boxes.npy"]
     owner = np.asarray(files.record["tracks"]["object_index"], np.int64)

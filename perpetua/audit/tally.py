@@ -8,20 +8,20 @@ from jaxtyping import Bool
 
 from perpetua.audit.report import Check
 
-# Labels of pixels are looked at in so many frames of a sequence, at even distances.
+# Labels of pixels are checked in this many frames of a sequence, evenly spaced.
 FRAMES_LOOKED_AT = 16
 
 
 def chosen_frames(count: int) -> list[int]:
-    """The frames of ``count`` that checks of every pixel look at."""
+    """The frames, out of ``count``, in which every pixel is checked."""
     chosen: list[int] = np.unique(np.linspace(0, count - 1, min(count, FRAMES_LOOKED_AT)).round().astype(int)).tolist()
     return chosen
 
 
 def few_enough(failed: int, tested: int, least: float) -> bool:
-    """Whether the share of entries that keep a rule is at least ``least``.
+    """Whether the fraction of entries that keep a rule is at least ``least``.
 
-    Where some may fail, one alone proves nothing: of 46 entries one is 2%, and says no more than one of 460.
+    Where some may fail, one failure is always allowed: one of 46 entries is 2%, and proves as little as one of 460.
     """
     return failed <= (1.0 - least) * tested + 1e-9 or (least < 1.0 and failed <= 1)
 
@@ -43,8 +43,8 @@ class Tally:
         tested: Bool[np.ndarray, "*any"] | None = None,
         figures: Callable[[int], str] | None = None,
     ) -> None:
-        """Counts entries of a file's frame, called ``name``; those not ``tested`` do not count. ``figures`` says more
-        of the entry of a flat index."""
+        """Counts entries of a file's frame, called ``name``; those not ``tested`` do not count. ``figures`` describes
+        the entry at a flat index."""
         bad = failed if tested is None else failed & tested
         self.tested += failed.size if tested is None else int(tested.sum())
         self.failed += int(bad.sum())
@@ -55,7 +55,7 @@ class Tally:
 
     @property
     def fraction(self) -> float:
-        """The share of entries that keep the rule."""
+        """The fraction of entries that keep the rule."""
         return 1.0 - self.failed / max(self.tested, 1)
 
     @property
@@ -67,7 +67,7 @@ class Tally:
 
 
 def check_of(name: str, tallies: list[Tally]) -> Check:
-    """One check of several rules; its value is the lowest share."""
+    """One check of several rules; its value is the lowest fraction."""
     faults = [tally.fault for tally in tallies if tally.fault]
     least = min(tally.least for tally in tallies)
     bound = f">= {least:g} of entries" + (", or all but one" if least < 1.0 else "")

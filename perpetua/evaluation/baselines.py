@@ -2,7 +2,7 @@
 tracks.
 
 Both begin at the surface that depth shows at the query's pixel. A point is called visible in a view where it projects
-onto the image and depth there is its own within 5%; so it is found again where tracking lost it and it stayed.
+onto the image and depth there is its own within 5%; so a lost point that stays at its place is found again.
 """
 
 from collections.abc import Callable
@@ -19,9 +19,9 @@ from perpetua.formats.reader import Sequence, SequenceView
 from perpetua.geometry.transforms import invert_rigid, transform_points
 
 SAME_DEPTH_FRACTION = 0.05
-# Lucas-Kanade: side of the window, times the image is halved, how far apart ways forth and back may end.
+# Lucas-Kanade: side of the window, number of pyramid levels, largest distance between a point and its return.
 WINDOW_PX, HALVINGS, RETURN_PX = 21, 3, 1.0
-# A point that leaps further from one frame to the next has slid onto another surface.
+# A point that moves further from one frame to the next has slid onto another surface.
 LEAP_M = 0.5
 
 
@@ -36,8 +36,8 @@ def still(sequence: Sequence) -> Predictions:
 
 
 def flow(sequence: Sequence) -> Predictions:
-    """Optical flow (pyramidal Lucas-Kanade) from the query through its view's images, forth and back in time, lifted
-    with depth; a point that is lost stays where it was last.
+    """Optical flow (pyramidal Lucas-Kanade) from the query through its view's images, forward and backward in time,
+    lifted with depth; a point that is lost stays at its last position.
 
     Raises:
         InputError: the sequence has no depth.
@@ -62,7 +62,7 @@ BASELINES: dict[str, Callable[[Sequence], Predictions]] = {"still": still, "flow
 
 @dataclass
 class _Way:
-    """Tracks of one view on their way through its images; ``pixel_px`` is where each is at the current frame."""
+    """Tracks of one view, followed through its images; ``pixel_px`` is the pixel of each at the current frame."""
 
     view: SequenceView
     grey: list[UInt8[np.ndarray, "H W"]]
@@ -71,7 +71,7 @@ class _Way:
     pixel_px: Float32[np.ndarray, "N 2"]
 
     def follow(self, place_m: Float64[np.ndarray, "F P 3"], step: int) -> None:
-        """Enters places in ``place_m`` frame by frame, forth (1) or back (-1)."""
+        """Fills ``place_m`` frame by frame, forward (1) or backward (-1)."""
         alive = np.isfinite(place_m[self.query_frame, self.tracks]).all(axis=1)
         frames = list(range(len(self.grey)))[::step]
         for before, after in pairwise(frames):
@@ -91,7 +91,7 @@ class _Way:
 def _lucas_kanade(
     before: UInt8[np.ndarray, "H W"], after: UInt8[np.ndarray, "H W"], pixel_px: Float32[np.ndarray, "N 2"]
 ) -> tuple[Float32[np.ndarray, "N 2"], Bool[np.ndarray, " N"]]:
-    """Where pixels went, and whether the way back leads to where they came from."""
+    """The pixels in the next image, and whether flow back from there returns to the start."""
     import cv2
 
     def move(image: np.ndarray, other: np.ndarray, points_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -114,7 +114,7 @@ def _grey(rgb: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W"]:
 
 
 def _query_points_m(truth: Truth) -> Float64[np.ndarray, "P 3"]:
-    """What depth shows at the queries, in the world; NaN where it shows nothing."""
+    """World positions of the surfaces that depth shows at the queries; NaN where it shows none."""
     start_m = np.full((truth.size.tracks, 3), np.nan)
     for number, view in enumerate(truth.sequence.views):
         for frame in np.unique(truth.query_frame[truth.query_view == number]).tolist():
@@ -146,7 +146,7 @@ def _depth_at(view: SequenceView, frame: int, pixel_px: Float64[np.ndarray, "N 2
 
 
 def _predictions(sequence: Sequence, place_m: Float64[np.ndarray, "F P 3"]) -> Predictions:
-    """Places in the sequence's world as predictions for every view; visible where depth agrees.
+    """Turns world positions into predictions for every view; a point is visible where depth agrees.
 
     Raises:
         InputError: the sequence has no depth.

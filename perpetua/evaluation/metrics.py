@@ -1,4 +1,4 @@
-"""What a prediction of tracks is worth: counts of entries, the scores that follow from them, and alignments.
+"""Scores of predicted tracks: counts of entries, the scores that follow from them, and alignments.
 
 An entry is a point of one track at one frame (and, where there are several, in one view). The definitions are those of
 TAPVid-3D (Koppula et al. 2024, ``tapnet/tapvid3d/evaluation/metrics.py``), stated here because they decide every
@@ -7,9 +7,9 @@ figure:
 - A position is right at a threshold where its distance to the truth is less than the threshold, strictly. Thresholds
   are 1, 2, 4, 8 and 16 pixels wide at the point: that many times Z / f, Z being the true depth and f the geometric mean
   of fx and fy.
-- Position accuracy: of the entries that are truly visible, the share with a right position, whether or not they were
+- Position accuracy: of the entries that are truly visible, the fraction with a right position, whether or not they were
   predicted visible; averaged over the thresholds (APD).
-- Occlusion accuracy: of all entries, the share whose visibility was predicted right.
+- Occlusion accuracy: of all entries, the fraction whose visibility was predicted right.
 - Jaccard: true positives (truly visible, predicted visible, position right) over truly visible entries plus false
   positives (predicted visible, and hidden or not right); averaged over the thresholds (AJ).
 
@@ -25,7 +25,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float64, Int64
 
 THRESHOLDS_PX = (1, 2, 4, 8, 16)
-# Larger numbers are no positions, and their squares overflow.
+# Larger numbers are not taken for positions: their squares overflow.
 FARTHEST = 1e100
 # Singular values that differ by more than this factor belong to points on a line or in one place.
 LEAST_SPREAD = 1e-9
@@ -33,7 +33,8 @@ LEAST_SPREAD = 1e-9
 
 @dataclass(frozen=True)
 class Scores:
-    """Shares between 0 and 1. ``jaccard`` and ``position`` are for each threshold, the averages over all of them."""
+    """Fractions between 0 and 1: one for each of ``THRESHOLDS_PX`` in ``jaccard`` and ``position_accuracy``, and the
+    averages over them."""
 
     average_jaccard: float
     average_position_accuracy: float
@@ -64,7 +65,7 @@ class Tally:
         )
 
     def scores(self) -> Scores | None:
-        """What the counts amount to; None where no entry is truly visible, so that there is nothing to find."""
+        """The scores of these counts; None where no entry is truly visible."""
         if self.visible == 0:
             return None
         jaccard = self.true_positives / (self.visible + self.false_positives)
@@ -116,7 +117,7 @@ def _counts(chosen: Iterable[Bool[np.ndarray, "*entries"]]) -> Int64[np.ndarray,
 
 
 def are_given(points: Float[np.ndarray, "*batch 3"]) -> Bool[np.ndarray, "*batch"]:
-    """Whether points are there at all: finite, and not beyond all measure."""
+    """Whether points are given: all coordinates finite and below ``FARTHEST``."""
     return np.asarray((np.abs(points.astype(np.float64)) < FARTHEST).all(axis=-1))
 
 

@@ -1,4 +1,4 @@
-"""The benchmark's protocol: which entries are scored in which frame, and what is aligned before.
+"""The benchmark's protocol: which entries are scored, in which coordinate frame, and after which alignment.
 
 Four regimes, each scored by ``perpetua.evaluation.metrics``:
 
@@ -11,7 +11,7 @@ Four regimes, each scored by ``perpetua.evaluation.metrics``:
 
 In camera coordinates, predictions of a view are multiplied by one factor: the median true distance of the points
 queried in it, at their queries, over the predicted one. (Where nothing is queried in a view, all tracks at their
-queries take that place.) World tracks are multiplied by one factor found likewise from all queries.
+queries are used.) World tracks are multiplied by one factor, found in the same way from all queries.
 
 A tracker is given its query, so that entry (the query's frame, in the query's view and in the world) is not scored,
 as in TAP-Vid; TAPVid-3D does score it, and ``score_queries`` does as TAPVid-3D. Entries of all views of a sequence
@@ -47,7 +47,7 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Truth:
-    """A sequence as the protocol looks at it."""
+    """The true values that the protocol needs, computed from a sequence."""
 
     sequence: Sequence
 
@@ -111,7 +111,7 @@ class Truth:
 
 
 def _whole(values: Float32[np.ndarray, " P"]) -> Int64[np.ndarray, " P"]:
-    """Whole numbers; -1 where there is none."""
+    """Values as integers; -1 where a value is not finite or too large."""
     sound = np.isfinite(values) & (np.abs(values) < 2**31)
     return np.where(sound, values, -1.0).astype(np.int64)
 

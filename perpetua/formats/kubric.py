@@ -45,7 +45,7 @@ from perpetua.io.files import write_json
 
 SENSOR_WIDTH_MM = 36.0
 OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0])
-# How far off the loader's camera a camera may be: a tenth of what would move a distance by 0.01%.
+# Largest deviation from the loader's camera: a tenth of that which changes a distance by 0.01%.
 _CENTRE_PX = 1e-3
 _SQUARE = 1e-5
 
@@ -58,7 +58,7 @@ class Kubric:
 
         Raises:
             InputError: the sequence's name holds no number.
-            SequenceFormatError: there is no depth, or a camera is not as the loader takes cameras to be.
+            SequenceFormatError: there is no depth, or a camera does not fit the loader's assumptions.
         """
         scene = folder / scene_number(source.name)
         scene.mkdir(parents=True)
@@ -157,7 +157,7 @@ def _write_rgba(path: Path, rgb: np.ndarray) -> None:
 
 
 def _segmentation(source: ExportSource, view: int, frame: int) -> UInt16[np.ndarray, "H W"] | None:
-    """None where the sequence has neither object index nor mask; the loader does without."""
+    """None where the sequence has neither object index nor mask; the loader does not require it."""
     if source.object_index is not None:
         return np.asarray(source.object_index[view][frame])
     foreground = source.sequence.views[view].foreground
@@ -165,7 +165,7 @@ def _segmentation(source: ExportSource, view: int, frame: int) -> UInt16[np.ndar
 
 
 def _world_from_camera(source: ExportSource, view: int) -> Float64[np.ndarray, "F 4 4"]:
-    """Poses with OpenCV axes, made orthonormal to double precision, so that a quaternion says them exactly."""
+    """Poses with OpenCV axes, made orthonormal to double precision, so that quaternions represent them exactly."""
     poses = source.sequence.views[view].camera_from_world.astype(np.float64)
     poses[:, :3, :3] = Rotation.from_matrix(poses[:, :3, :3]).as_matrix()
     return invert_rigid(poses)

@@ -28,11 +28,11 @@ class PixelCentreResize:
 
     @property
     def scale(self) -> Float64[np.ndarray, "2"]:
-        """What x and y are multiplied by."""
+        """Factors of x and y."""
         return (np.array(self.new_px) - 1.0) / (np.array(self.old_px) - 1.0)
 
     def image(self, image: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "new_H new_W 3"]:
-        """Linear interpolation, and when it gets smaller a mean weighted by a tent, so that nothing aliases."""
+        """Linear interpolation when enlarging; when reducing, a mean weighted by a tent, which prevents aliasing."""
         rows = _blend(image.astype(np.float32), _tent(self.old_px[1], self.new_px[1]))
         columns = _blend(np.swapaxes(rows, 0, 1), _tent(self.old_px[0], self.new_px[0]))
         return np.ascontiguousarray(np.swapaxes(np.rint(columns), 0, 1)).astype(np.uint8)
@@ -46,7 +46,7 @@ class PixelCentreResize:
 
 @dataclass(frozen=True)
 class _Taps:
-    """For every new pixel the old ones that it is made of, and their weights."""
+    """For every new pixel the old pixels it is computed from, and their weights."""
 
     index: Int64[np.ndarray, "new taps"]
     weight: Float32[np.ndarray, "new taps"]

@@ -80,7 +80,7 @@ class Clip(NamedTuple):
 
 @dataclass(frozen=True)
 class _ClipPlace:
-    """What a clip takes; ``length`` counts the frames of its sequence."""
+    """The frames and views that a clip reads; ``length`` is the number of frames of its sequence."""
 
     folder: Path
     views: tuple[int, ...]
@@ -214,7 +214,7 @@ class SequenceDataset(Dataset[Clip]):
 
 @dataclass(frozen=True)
 class _ViewPart:
-    """What one view adds to a clip."""
+    """The arrays of one view in a clip."""
 
     images: UInt8[np.ndarray, "T 3 H W"]
     depth_m: Float32[np.ndarray, "T Hd Wd"]

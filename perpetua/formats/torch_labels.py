@@ -21,7 +21,7 @@ def read_labels(
     labels: tuple[str, ...],
     size_px: tuple[int, int] | None,
 ) -> dict[str, Tensor]:
-    """Labels of a clip; ``perpetua.formats.torch_dataset.Clip`` says in which form.
+    """Labels of a clip, in the form that ``perpetua.formats.torch_dataset.Clip`` describes.
 
     Args:
         folder: the sequence's.
@@ -38,7 +38,7 @@ def read_labels(
     read: dict[str, Tensor] = {}
     if "object_index" in labels:
         index = [reader.read(view, layout.OBJECT_INDEX, np.uint16) for view in views]
-        # PyTorch can do little with 16 bits without a sign.
+        # PyTorch supports few operations on unsigned 16-bit integers.
         read["object_index"] = torch.from_numpy(np.stack(index).astype(np.int64))
     if "normals" in labels:
         read["normals"] = torch.stack([reader.vectors(view, layout.NORMALS, 3) for view in views])

@@ -1,4 +1,4 @@
-"""Normals of surfaces that pixels show, and where their points go: in the world, and in images."""
+"""Normals, scene flow and optical flow of the surfaces that pixels show."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ from perpetua.labels.pixels import LabelledScene, PixelSurfaces
 from perpetua.tracks.sight import NOTHING
 from perpetua.tracks.visibility import REACHED_FRACTION, REACHED_M
 
-# What becomes of a pixel's point in another image.
+# States of a pixel's point in another image.
 NONE, SEEN, HIDDEN, OUTSIDE = range(4)
 
 
 @dataclass(frozen=True)
 class PixelFlow:
-    """How far points of pixels are from them in another image, and whether that shows them.
+    """Flow of pixels to another image, in pixels, and whether that image shows their points.
 
     ``state``: 1 seen; 2 hidden by something; 3 outside the image; 0, with a flow of 0, behind the camera.
     """
@@ -38,12 +38,12 @@ def normals(scene: LabelledScene, surfaces: PixelSurfaces) -> Float64[np.ndarray
 
 
 def scene_flow_m(surfaces: PixelSurfaces, frame: int) -> Float64[np.ndarray, "N 3"]:
-    """How far points of pixels are in the world at another frame from where they are; exactly 0 for what is rigid."""
+    """World displacement of the pixels' points to another frame, metres; exactly 0 on rigid objects."""
     return surfaces.bound.point_m(frame) - surfaces.bound.point_m(surfaces.frame)
 
 
 def flow(scene: LabelledScene, surfaces: PixelSurfaces, view: int, frame: int) -> PixelFlow:
-    """Where points of pixels are in the image of a view and frame."""
+    """Flow of the pixels' points to the image of a view and frame."""
     camera = scene.cameras[view]
     pose = camera.camera_from_world[frame]
     point_m = surfaces.bound.point_m(frame)

@@ -33,7 +33,7 @@ class Chart:
 
     @property
     def total(self) -> int:
-        """Of all bars."""
+        """Sum of the counts of all bars."""
         return sum(bar.count for bar in self.bars)
 
 
@@ -46,7 +46,7 @@ def histogram(title: str, note: str, counts: Int64[np.ndarray, " _"], edges: tup
 
 
 def tally(title: str, note: str, counts: Int64[np.ndarray, " _"], what: str) -> Chart:
-    """A bar for each number from 0; the last one holds all that are more, where the scale is used up to its end."""
+    """A bar for each number from 0; a bar at the end of the scale also holds all larger numbers."""
     _, last = _filled(counts)
     labels = [f"{number} {what}" for number in range(last + 1)]
     ticks = [str(number) for number in range(last + 1)]
@@ -57,7 +57,7 @@ def tally(title: str, note: str, counts: Int64[np.ndarray, " _"], what: str) -> 
 
 
 def named(title: str, note: str, counts: dict[str, int], most: int = 16) -> Chart:
-    """A row for each name, the most frequent first; what is beyond ``most`` rows is one row together."""
+    """A row for each name, the most frequent first; names beyond ``most`` rows share one row."""
     ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
     shown, rest = ordered[:most], ordered[most:]
     if rest:
@@ -66,7 +66,7 @@ def named(title: str, note: str, counts: dict[str, int], most: int = 16) -> Char
 
 
 def fractions(title: str, note: str, values: dict[str, float]) -> Chart:
-    """A row for each name, as long as its share of 1."""
+    """A row for each name, as long as its fraction."""
     bars = tuple(Bar(name, 0, fraction, fraction) for name, fraction in values.items())
     return Chart(title, note, bars, rows=True)
 

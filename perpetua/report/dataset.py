@@ -1,4 +1,4 @@
-"""What a data set's sequences come to together: charts, checks, costs, and the comparison with the reference data."""
+"""Figures of a whole data set: charts, checks, costs, and the comparison with the reference data."""
 
 import math
 from collections import Counter, defaultdict
@@ -27,7 +27,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class CheckRow:
-    """A rule over all sequences that were checked against it: the range of its value, its bound, how many passed."""
+    """One check over all sequences that have it: the range of its value, its bound, how many passed."""
 
     name: str
     bound: str

@@ -13,14 +13,14 @@ from perpetua.report import scales
 from perpetua.report.scales import Counts, binned, counted
 from perpetua.tracks.motion import MOVING_M, is_fast, travel_m
 
-# Enough for a distribution: so many frames, and every so many pixels.
+# Distributions are taken from a sample: this many frames, and every fourth pixel along each side.
 SAMPLED_FRAMES = 12
 PIXEL_STEP = 4
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Sizes, shares and counts.
+    """Sizes, fractions and counts.
 
     ``moving`` and ``fast`` count tracks. ``visible_fraction`` has one entry per view: the fraction of tracks and
     frames that it sees. ``origin_m`` is the range of the cameras' distances from the world's origin, ``depth_m``
@@ -110,7 +110,7 @@ def _counts(
 def _occlusions(
     sequence: Sequence, visible: Bool[np.ndarray, "C F P"], sizes_px: list[tuple[int, int]]
 ) -> Int64[np.ndarray, " _"]:
-    """How often a track that a view sees is hidden in the next frame although it is on the image."""
+    """Tracks in each view that sees them, counted by how often they become hidden while on the image."""
     total = np.zeros(scales.MOST_OCCLUSIONS + 1, np.int64)
     for seen, view, size_px in zip(visible, sequence.views, sizes_px, strict=True):
         hides = seen[:-1] & ~seen[1:] & _on_image(sequence, view, size_px)[1:]

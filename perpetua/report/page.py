@@ -32,7 +32,7 @@ def write_report(root: Path, folders: list[Path], page: Path, say: Callable[[str
     ]
     for one in figures:
         if one.measured is None:
-            say(f"{one.folder}: {one.lacks[-1]}")
+            say(f"{one.folder}: {one.missing[-1]}")
     environment = html_environment(Path(__file__).parent)
     environment.filters |= {"figure": _figure, "duration": _duration, "known": _known}
     write_html(
@@ -52,7 +52,7 @@ def write_report(root: Path, folders: list[Path], page: Path, say: Callable[[str
 
 
 def _names(root: Path, folders: list[Path]) -> list[str]:
-    """Names of the folders; where several runs with the same names lie below the root, their ways there."""
+    """Names of the folders; where several folders share a name, their paths below the root."""
     names = [folder.resolve().name for folder in folders]
     if len(set(names)) == len(names):
         return names
@@ -60,12 +60,12 @@ def _names(root: Path, folders: list[Path]) -> list[str]:
 
 
 def _known(value: float) -> float | None:
-    """None for what is not a number."""
+    """The value, or None if it is not finite."""
     return value if math.isfinite(value) else None
 
 
 def _figure(value: float | None) -> str:
-    """A number as short as it can be read."""
+    """A number with as few digits as are useful."""
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0.0 or 1e-2 <= abs(value) < 1e5:
@@ -74,7 +74,7 @@ def _figure(value: float | None) -> str:
 
 
 def _duration(seconds: float | None) -> str:
-    """Seconds as a person says them."""
+    """Seconds, minutes or hours, whichever reads best."""
     if seconds is None:
         return "–"
     if seconds < 100.0:

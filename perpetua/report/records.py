@@ -1,4 +1,4 @@
-"""What sequence.json, audit.json and log.jsonl say, as far as they say it. They may come from anywhere."""
+"""The content of sequence.json, audit.json and log.jsonl, as far as it is known. The files may come from anywhere."""
 
 import json
 import re
@@ -13,12 +13,12 @@ Model = TypeVar("Model", bound="Lenient")
 
 
 class Lenient(BaseModel):
-    """Takes what it knows of a file and leaves the rest."""
+    """A model of the known entries of a file; other entries are ignored."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
 
-class Thing(Lenient):
+class ObjectRecord(Lenient):
     """An object of a sequence."""
 
     category: str = ""
@@ -32,7 +32,7 @@ class SequenceRecord(Lenient):
     room: int | None = None
     room_kind: str | None = None
     fps: float | None = Field(None, gt=0.0)
-    objects: tuple[Thing, ...] = ()
+    objects: tuple[ObjectRecord, ...] = ()
 
     @property
     def people(self) -> tuple[str, ...]:

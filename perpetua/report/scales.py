@@ -1,4 +1,4 @@
-"""What is counted of a sequence, and in which steps. Counts of sequences add up to those of a data set."""
+"""What is counted of a sequence, and in which bins. Counts of sequences add up to those of a data set."""
 
 from dataclasses import dataclass, fields
 
@@ -45,7 +45,7 @@ class Counts:
 
 
 def binned(values: np.ndarray, edges: tuple[float, ...]) -> Int64[np.ndarray, " _"]:
-    """How many values fall into each bin; what lies outside counts in the first or last one, NaN nowhere."""
+    """How many values fall into each bin; values outside count in the first or last bin, NaN in none."""
     known = np.asarray(values, np.float64).ravel()
     known = known[~np.isnan(known)]
     places = np.searchsorted(np.array(edges[1:-1]), known, side="right")
@@ -53,5 +53,5 @@ def binned(values: np.ndarray, edges: tuple[float, ...]) -> Int64[np.ndarray, " 
 
 
 def counted(values: np.ndarray, most: int) -> Int64[np.ndarray, " _"]:
-    """How often 0, 1, ... ``most`` occur; what is more counts as ``most``."""
+    """How often 0, 1, ... ``most`` occur; larger values count as ``most``."""
     return np.bincount(np.minimum(np.asarray(values, np.int64).ravel(), most), minlength=most + 1).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Small pictures of a sequence that lie inside the page."""
+"""Small pictures of a sequence, embedded in the page."""
 
 import base64
 import io

@@ -15,7 +15,7 @@ SMOOTH = 3
 
 
 def track_colour(index: int, bright: bool) -> Colour:
-    """Colours that neighbours in number do not share: hues a golden section apart."""
+    """A colour for a track number; neighbouring numbers have hues a golden section apart."""
     hue = (index * 0.618034) % 1.0
     red, green, blue = colorsys.hsv_to_rgb(hue, 0.85 if bright else 0.25, 1.0 if bright else 0.9)
     return int(255 * red), int(255 * green), int(255 * blue)

@@ -10,7 +10,7 @@ from perpetua.formats.source import ExportSource
 from perpetua.report.pictures.drawing import BACKGROUND, INK, text_font
 from perpetua.report.pictures.sheets import CELL_WIDTH_PX, Row, assemble, evenly_spread, nearest_resized
 
-# An object is named where it covers so much of the image; smaller ones would only hide what is behind their names.
+# An object is named where it covers at least this fraction of the image; names of smaller ones would hide too much.
 NAMED_FRACTION = 0.02
 MOST_NAMES = 8
 NAME_PX, STROKE_PX = 12, 2

@@ -1,4 +1,4 @@
-"""A plan of a sequence from above, with the ways of people and cameras, and curves of how they move."""
+"""A plan of a sequence from above, with the paths of people and cameras, and curves of how they move."""
 
 from pathlib import Path
 from typing import Any
@@ -14,19 +14,20 @@ from perpetua.audit.geometry import camera_centre_m, moves_more_than
 from perpetua.formats.layout import AUDIT
 from perpetua.formats.reader import Sequence, SequenceView
 from perpetua.io.files import read_json
+from perpetua.tracks.motion import MOVING_M
 
 FRUSTUM_M = 0.7
 FRUSTA = 5
-MOVING_M = 0.05
 HEAD_ROOM_M = 2.2
-# What spreads over more of the floor is the floor itself or the like, and would hide the rest.
+# An object that covers more of the floor is the floor itself or a carpet, and would hide the rest.
 STRUCTURE_FRACTION = 0.6
-# Footprints are convex: that of a wall around a corner would cover floor. Such walls the floor's outline shows.
+# Footprints are convex, so the footprint of a wall around a corner would cover floor. The floor's outline shows such
+# walls.
 WALLS = ("wall", "skirting_board")
 THICKEST_WALL_M = 0.25
 PEOPLE = ("tab:red", "tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:pink")
 CAMERAS = ("black", "darkorange", "teal", "crimson", "slateblue", "olive")
-# What is drawn of the audit's curves: title, curve, whether of people.
+# The curves of the audit that are drawn: title, name, whether they are of people.
 CURVES = (
     ("people: speed, m/s", "actor_speed_mps", True),
     ("people: to furniture and walls, m (1: or more)", "actor_scene_m", True),
@@ -120,7 +121,7 @@ def _frustum_m(view: SequenceView, frame: int, centre_m: Float64[np.ndarray, "3"
     """The sides of the image from above: a triangle, closed."""
     fx, _, cx, _ = np.asarray(view.intrinsics_px, np.float64)
     world_from_camera = np.asarray(view.camera_from_world[frame, :3, :3], np.float64).T
-    # The principal point is taken for the middle, so the image's sides lie cx to its left and right.
+    # The principal point is taken as the middle, so the image's sides lie cx to its left and right.
     sides = np.array([[-cx / fx, 0.0, 1.0], [cx / fx, 0.0, 1.0]]) * FRUSTUM_M
     ends_m = centre_m + sides @ world_from_camera.T
     return np.stack([centre_m, ends_m[0], ends_m[1], centre_m])[:, :2]

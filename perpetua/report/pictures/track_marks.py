@@ -9,13 +9,13 @@ from PIL import Image
 from perpetua.audit.geometry import moves_more_than, project_to_pixels
 from perpetua.formats.reader import Sequence, SequenceView
 from perpetua.report.pictures.drawing import Canvas, Colour, track_colour
+from perpetua.tracks.motion import MOVING_M
 
 MOVING_TRACKS = 90
 STILL_TRACKS = 60
 TAIL_FRACTION = 0.1
 LONGEST_TAIL_FRAMES = 16
-MOVING_M = 0.05
-# Nearer to the camera's plane, or behind it, a point has no pixel worth drawing.
+# Points nearer to the camera's plane, or behind it, are not drawn.
 NEAREST_M = 0.05
 
 
@@ -33,7 +33,7 @@ class ShownTracks:
 
 
 def choose_tracks(sequence: Sequence) -> ShownTracks:
-    """As many tracks as a picture can bear, evenly from those that move and those that do not."""
+    """A number of tracks that a picture can show, evenly from those that move and those that do not."""
     moves = moves_more_than(sequence.tracks_m, MOVING_M)
     still, moving = (_evenly(np.flatnonzero(~moves), STILL_TRACKS), _evenly(np.flatnonzero(moves), MOVING_TRACKS))
     tail_frames = max(2, round(TAIL_FRACTION * len(sequence.tracks_m)))

@@ -15,9 +15,9 @@ from perpetua.report.pictures.track_marks import ShownTracks, choose_tracks, dra
 
 CELL_WIDTH_PX = 480
 GAP_PX = 4
-# What a player draws as it was: near to lossless to the eye, and not much larger.
+# Quality of the video: close to lossless to the eye, and not much larger.
 QUALITY = "18"
-# A picture that a page loads at once: smaller, and lossy enough to be light.
+# Size and quality of the animated picture, which a page must load quickly.
 ANIMATION_WIDTH_PX, ANIMATION_QUALITY = 480, 40
 
 
@@ -61,7 +61,7 @@ def encode(frames: Iterator[UInt8[np.ndarray, "H W 3"]], fps: float, video: Path
     with av.open(str(video), "w", format="mp4", options={"movflags": "+faststart"}) as container:
         stream = container.add_stream("libx264", rate=rate, options={"crf": QUALITY})
         stream.pix_fmt = "yuv420p"
-        # Said in the file, since players guess by size otherwise.
+        # Written into the file, because players otherwise guess it from the size.
         stream.codec_context.colorspace = Colorspace.ITU709
         stream.codec_context.color_primaries = ColorPrimaries.BT709
         stream.codec_context.color_trc = ColorTrc.BT709
