@@ -32,7 +32,7 @@ def viewer_layout(source: ExportSource) -> Any:
         rrb.Horizontal(
             rrb.Tabs(scene, points, active_tab=first),
             rrb.Grid(*images, grid_columns=math.ceil(math.sqrt(len(images)))),
-            column_fractions=[1.2, 1.0],
+            column_shares=[1.2, 1.0],
         ),
         rrb.TimePanel(expanded=False),
         rrb.SelectionPanel(expanded=False),
