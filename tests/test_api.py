@@ -15,7 +15,7 @@ from perpetua.errors import GenerationError, InputError, PerpetuaError, Sequence
 from perpetua.formats.reader import read_sequence
 from perpetua.pipeline.layout import read_run
 from perpetua.runs import generate as generation
-from tests.support.synthetic_sequence import write_scene
+from perpetua.testing.synthetic_sequence import write_scene
 
 
 @pytest.fixture

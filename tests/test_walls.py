@@ -46,6 +46,14 @@ def test_package_never_imports_blender() -> None:
     assert offenders == set()
 
 
+def test_only_the_suites_import_pytest_and_nothing_imports_the_suites() -> None:
+    suites = PACKAGE / "testing"
+    for path in _package_files():
+        if not path.is_relative_to(suites):
+            assert "pytest" not in set(_imports(path)), path
+            assert "perpetua.testing" not in path.read_text(encoding="utf-8"), path
+
+
 def _scripts() -> list[Path]:
     scripts = sorted(SCRIPTS.rglob("*.py"))
     assert len(scripts) > 20

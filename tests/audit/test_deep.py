@@ -13,9 +13,9 @@ import pytest
 from perpetua.audit.config import AuditConfig
 from perpetua.audit.deep_scene import DeepScene
 from perpetua.audit.verify import verify_sequence
+from perpetua.testing.synthetic_scene import make_scene
+from perpetua.testing.synthetic_sequence import write_scene
 from tests.support.planted_faults import Fault, assign, change
-from tests.support.synthetic_scene import make_scene
-from tests.support.synthetic_sequence import write_scene
 
 FRAMES = 3
 DEEP = ("depth by rays", "objects by rays", "visibility by rays", "tracks on meshes")

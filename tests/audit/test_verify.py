@@ -11,8 +11,8 @@ from perpetua.audit.config import AuditConfig
 from perpetua.audit.verify import find_sequences, verify_sequence
 from perpetua.errors import SequenceFormatError
 from perpetua.formats.config import OUTPUTS
+from perpetua.testing.synthetic_sequence import write_scene
 from tests.support.planted_faults import FAULTS, images, other_way, ray_length, record_hashes, swap
-from tests.support.synthetic_sequence import write_scene
 
 BOUNDS = AuditConfig()
 

@@ -17,7 +17,7 @@ from perpetua.rooms.acceptance.build import build_room
 from perpetua.rooms.config import RoomsConfig, SceneFileConfig
 from perpetua.scene.room import Material, Room, SceneObject
 from perpetua.seeding import StageSeed
-from tests.support.scene_samples import Y_UP_FROM_Z_UP, procedural_room, write_scene
+from perpetua.testing.scene_samples import Y_UP_FROM_Z_UP, procedural_room, write_scene
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 

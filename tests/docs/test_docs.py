@@ -25,11 +25,11 @@ from perpetua.rooms.acceptance.build import build_room, check_source
 from perpetua.rooms.config import RoomsConfig
 from perpetua.rooms.source import ROOM_SOURCES
 from perpetua.seeding import StageSeed
+from perpetua.testing.motion_samples import empty_room, sample_route, sample_skeleton
+from perpetua.testing.synthetic_sequence import write_scene
 from tests.support.doc_pages import ALL_PAGES, PROGRAMS, ROOT, DocCommand, blocks, commands
 from tests.support.makehuman_files import write_folder
-from tests.support.motion_samples import empty_room, sample_route, sample_skeleton
 from tests.support.small_run import write_run
-from tests.support.synthetic_sequence import write_scene
 
 COMMANDS = commands()
 OURS = [command for command in COMMANDS if command.words[0] in PROGRAMS]

@@ -20,7 +20,7 @@ from perpetua.evaluation.protocol import (
     evaluate_sequence,
 )
 from perpetua.formats.reader import Sequence, read_sequence
-from tests.support.synthetic_sequence import write_scene
+from perpetua.testing.synthetic_sequence import write_scene
 
 TURN = Similarity(1.0, np.array([[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]]), np.array([3.0, -2.0, 0.5]))
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from perpetua.cli.app import main
 from perpetua.evaluation.protocol import OTHER_VIEWS, QUERY_VIEW, WORLD_MEDIAN
-from tests.support.synthetic_sequence import write_scene
+from perpetua.testing.synthetic_sequence import write_scene
 
 
 @pytest.fixture(scope="module")

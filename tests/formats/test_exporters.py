@@ -16,9 +16,9 @@ from perpetua.formats.kubric import scene_number
 from perpetua.formats.reader import read_sequence
 from perpetua.formats.source import EXPORTERS, ExportSource
 from perpetua.runs.export import export_sequence
+from perpetua.testing.synthetic_scene import Scene
+from perpetua.testing.synthetic_sequence import write_scene
 from perpetua.tracks.types import SequenceTracks
-from tests.support.synthetic_scene import Scene
-from tests.support.synthetic_sequence import write_scene
 
 NAME = "seed5-room0002"
 FRAMES, VIEWS, WIDTH_PX, HEIGHT_PX = 6, 3, 96, 72

@@ -16,8 +16,8 @@ from perpetua.formats.rerun_meshes import entity_name, vertex_colours, vertex_no
 from perpetua.formats.rerun_recording import save_recording
 from perpetua.formats.source import ExportSource, KeptMeshes
 from perpetua.scene.room import Material
-from tests.support.synthetic_scene import Scene
-from tests.support.synthetic_sequence import write_scene
+from perpetua.testing.synthetic_scene import Scene
+from perpetua.testing.synthetic_sequence import write_scene
 
 FRAMES, VIEWS = 6, 3
 

@@ -10,7 +10,7 @@ import pytest
 from perpetua.errors import ConfigError, SequenceFormatError
 from perpetua.formats.reader import read_sequence
 from perpetua.formats.source import EXPORTERS
-from tests.support.synthetic_sequence import write_scene
+from perpetua.testing.synthetic_sequence import write_scene
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from perpetua.motion.config import MotionConfig
 from perpetua.motion.plan import make_motions
 from perpetua.motion.vocabulary import ACTIONS
 from perpetua.seeding import StageSeed
-from tests.support.motion_samples import empty_room, sample_route, sample_skeleton
+from perpetua.testing.motion_samples import empty_room, sample_route, sample_skeleton
 
 SEED = StageSeed(5, 0, "motion")
 

@@ -8,7 +8,7 @@ from perpetua.motion.footsteps import Plant, step_timing
 from perpetua.motion.ground import Ground
 from perpetua.motion.kinematics import contact_positions, joint_positions, solve_two_bones
 from perpetua.scene.actor import BodyMotion
-from tests.support.motion_samples import empty_room, sample_skeleton
+from perpetua.testing.motion_samples import empty_room, sample_skeleton
 
 
 def test_the_rest_pose_puts_every_joint_where_the_skeleton_has_it() -> None:

@@ -18,8 +18,8 @@ from perpetua.navigation.seat_measure import measure_seat
 from perpetua.scene.actor import BodyMotion, Dwell, Route
 from perpetua.scene.room import Room, SceneObject
 from perpetua.seeding import StageSeed
-from tests.support.motion_samples import empty_room, sample_route, sample_skeleton
-from tests.support.synthetic_scene import GREY, box, tri
+from perpetua.testing.motion_samples import empty_room, sample_route, sample_skeleton
+from perpetua.testing.synthetic_scene import GREY, box, tri
 
 FPS = 24.0
 SKELETON = sample_skeleton()

@@ -6,7 +6,7 @@ import trimesh
 
 from perpetua.navigation.seats import find_seats
 from perpetua.scene.room import Room, SceneObject
-from tests.support.synthetic_scene import GREY, box, tri
+from perpetua.testing.synthetic_scene import GREY, box, tri
 
 CHAIR = (((0.45, 0.45, 0.45), (0.0, 0.0, 0.225)), ((0.018, 0.45, 0.5), (-0.21, 0.0, 0.7)))
 

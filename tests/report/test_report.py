@@ -20,7 +20,7 @@ from perpetua.report.measure import Measured, measure
 from perpetua.report.records import garments, height_cm
 from perpetua.report.scales import APART_DEG, TRAVEL_M, binned, counted
 from perpetua.seeding import StageSeed
-from tests.support.synthetic_sequence import write_scene
+from perpetua.testing.synthetic_sequence import write_scene
 
 HOSTILE = "<script>document.title = 'taken'</script>\"'&"
 GARMENTS = {

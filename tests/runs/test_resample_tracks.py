@@ -15,8 +15,8 @@ from perpetua.geometry.pinhole import project
 from perpetua.geometry.transforms import invert_rigid, transform_points
 from perpetua.pipeline.kept import load_deep_scene
 from perpetua.runs.resample_tracks import PixelChoice, write_other_tracks
+from perpetua.testing.synthetic_scene import make_scene
 from tests.support.small_run import write_run
-from tests.support.synthetic_scene import make_scene
 
 SEED, ROOM = 5, 2
 

@@ -13,8 +13,8 @@ from perpetua.pipeline.stages import STAGES
 from perpetua.pipeline.store import Manifest, StageFolder, output_hashes
 from perpetua.scene.actor import Route
 from perpetua.seeding import StageSeed
-from tests.support.synthetic_scene import make_scene
-from tests.support.synthetic_sequence import make_scene_tracks
+from perpetua.testing.synthetic_scene import make_scene
+from perpetua.testing.synthetic_sequence import make_scene_tracks
 
 TRACKS = 60
 

@@ -7,14 +7,14 @@ import pytest
 from scipy.sparse import csr_matrix
 
 from perpetua.errors import TrackError
+from perpetua.testing.synthetic_scene import make_scene
+from perpetua.testing.synthetic_sequence import make_scene_tracks
 from perpetua.tracks.candidates import ActorSurfaces
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.motion import is_fast, travel_m
 from perpetua.tracks.queries import draw_queries
 from perpetua.tracks.selection import spread
 from perpetua.tracks.types import SequenceTracks, ViewTracks
-from tests.support.synthetic_scene import make_scene
-from tests.support.synthetic_sequence import make_scene_tracks
 
 
 @pytest.fixture(scope="module")

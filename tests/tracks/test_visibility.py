@@ -9,6 +9,8 @@ import trimesh
 from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.pinhole import Intrinsics, inside_image, project
 from perpetua.geometry.planes import Planes
+from perpetua.testing.synthetic_scene import make_scene, tri
+from perpetua.testing.synthetic_sequence import make_scene_tracks
 from perpetua.tracks.around import ViewFrame
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.placed import PlacedPoints
@@ -16,8 +18,6 @@ from perpetua.tracks.sides import ClosedSides, closed_sides
 from perpetua.tracks.sight import HairFaces, SceneSight, SightHits
 from perpetua.tracks.surface import SceneMeshes, plane_barycentric
 from perpetua.tracks.visibility import visible_in_frame
-from tests.support.synthetic_scene import make_scene, tri
-from tests.support.synthetic_sequence import make_scene_tracks
 
 CONFIG = TracksConfig()
 CAMERA = Intrinsics.centred(64, 48, 1.2)

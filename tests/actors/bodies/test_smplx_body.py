@@ -22,7 +22,7 @@ from perpetua.actors.config import ActorsConfig, ClothingConfig, SmplxConfig
 from perpetua.errors import AssetError
 from perpetua.scene.actor import BODY_PARENTS, BodyMotion
 from perpetua.seeding import StageSeed
-from tests.support.smplx_files import joints_m, model_arrays, write_model
+from perpetua.testing.smplx_files import joints_m, model_arrays, write_model
 
 BARE_HANDS = np.tile(np.eye(3), (30, 1, 1))
 SEED = StageSeed(4, 0, "bodies")

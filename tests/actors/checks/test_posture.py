@@ -13,8 +13,8 @@ from perpetua.motion.procedural import ProceduralMotion
 from perpetua.motion.rotations import about_y, about_z
 from perpetua.scene.actor import BodyMotion
 from perpetua.seeding import StageSeed
+from perpetua.testing.motion_samples import empty_room, sample_route, sample_skeleton
 from tests.actors.checks.test_validation import _tubes
-from tests.support.motion_samples import empty_room, sample_route, sample_skeleton
 
 SKELETON = sample_skeleton()
 

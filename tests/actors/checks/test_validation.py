@@ -18,8 +18,8 @@ from perpetua.motion.procedural import ProceduralMotion
 from perpetua.scene.actor import BODY_PARENTS, ActorMesh, ActorPart, BodyMotion, Route, Skeleton
 from perpetua.scene.room import Room, SceneObject
 from perpetua.seeding import StageSeed
-from tests.support.motion_samples import empty_room, sample_route, sample_skeleton
-from tests.support.synthetic_scene import GREY, box, tri
+from perpetua.testing.motion_samples import empty_room, sample_route, sample_skeleton
+from perpetua.testing.synthetic_scene import GREY, box, tri
 
 FPS = 24.0
 SKELETON = sample_skeleton()

@@ -28,8 +28,8 @@ from perpetua.motion.rotations import about_y, about_z
 from perpetua.motion.source import MOTION_SOURCES
 from perpetua.scene.actor import BODY_JOINTS, BodyMotion, Route
 from perpetua.seeding import StageSeed
-from tests.support.motion_files import Y_UP_FROM_OURS, mixamo_name, write_amass, write_bvh
-from tests.support.motion_samples import empty_room, sample_route, sample_skeleton
+from perpetua.testing.motion_files import Y_UP_FROM_OURS, mixamo_name, write_amass, write_bvh
+from perpetua.testing.motion_samples import empty_room, sample_route, sample_skeleton
 
 # Legs of SMPL-X's mean length, so that files without lengths are of our size.
 SKELETON = sample_skeleton(1.7 * 0.81 / 0.8252)

@@ -18,8 +18,8 @@ from perpetua.motion.recorded.kimodo_files import make_request, read_kimodo, rea
 from perpetua.motion.source import MOTION_SOURCES
 from perpetua.scene.actor import BODY_JOINTS, BodyMotion, Route
 from perpetua.seeding import StageSeed
-from tests.support.motion_files import install_fake_kimodo, write_amass
-from tests.support.motion_samples import empty_room, sample_route, sample_skeleton
+from perpetua.testing.motion_files import install_fake_kimodo, write_amass
+from perpetua.testing.motion_samples import empty_room, sample_route, sample_skeleton
 
 SKELETON = sample_skeleton()
 FPS = 24.0

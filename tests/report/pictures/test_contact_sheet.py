@@ -14,7 +14,7 @@ from perpetua.report.pictures.contact_sheet import write_contact_sheet
 from perpetua.report.pictures.drawing import Canvas, depth_colours
 from perpetua.report.pictures.plan_view import CURVES, write_plan_view
 from perpetua.report.pictures.sheets import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX
-from tests.support.synthetic_sequence import write_scene
+from perpetua.testing.synthetic_sequence import write_scene
 
 
 @pytest.fixture(scope="module")

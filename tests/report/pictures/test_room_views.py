@@ -15,7 +15,7 @@ from perpetua.report.pictures.room_views import CLEARANCE_M, CUT_FRACTION, TOP, 
 from perpetua.runs.preview_rooms import GalleryRequest, RoomCard, _write_page, describe_room
 from perpetua.scene.camera import CameraPath
 from perpetua.scene.room import Room
-from tests.support.scene_samples import procedural_room
+from perpetua.testing.scene_samples import procedural_room
 
 
 @pytest.fixture(scope="module", params=["livingroom", "bathroom"])

@@ -4,11 +4,11 @@ from pathlib import Path
 
 from perpetua.formats.tapvid_mv import write_sequence
 from perpetua.seeding import StageSeed
+from perpetua.testing.synthetic_scene import Scene, make_scene
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.follow import TrackScene
 from perpetua.tracks.make import make_tracks
 from perpetua.tracks.types import SequenceTracks
-from tests.support.synthetic_scene import Scene, make_scene
 
 CONFIG = TracksConfig(count=200)
 

@@ -1,59 +1,38 @@
 """What every motion source keeps, on every kind of route and at every frame rate.
 
-A source that needs files or programs has a module of its name in ``motion_setups`` with ``motion_config(folder)``,
-which makes them in ``folder`` and returns the config that uses them.
+A source that needs files or programs has a sample, which makes them and returns the config that uses them.
 """
 
-import importlib.util
-import tempfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from perpetua.machine.assets import ASSET_FOLDER_VARIABLE
 from perpetua.motion.config import MotionConfig
 from perpetua.motion.kinematics import contact_positions, joint_index, joint_positions
 from perpetua.motion.source import MOTION_SOURCES
 from perpetua.scene.actor import BodyMotion, Route
 from perpetua.seeding import StageSeed
-from tests.support.motion_samples import ROUTE_KINDS, empty_room, sample_route, sample_skeleton
+from perpetua.testing.chosen import names_of, samples_of
+from perpetua.testing.motion_samples import ROUTE_KINDS, empty_room, sample_route, sample_skeleton
 
 SEED = StageSeed(11, 2, "motion")
 SKELETON = sample_skeleton()
 ROOM = empty_room()
-sources = pytest.mark.parametrize("source", list(MOTION_SOURCES))
 kinds = pytest.mark.parametrize("kind", ROUTE_KINDS)
 rates = pytest.mark.parametrize("fps", [12.0, 24.0, 30.0])
-
-
-SETUPS = Path(__file__).parent / "motion_setups"
 CONFIGS: dict[str, MotionConfig] = {}
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _configs() -> Iterator[None]:
-    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
-        patch.setenv(ASSET_FOLDER_VARIABLE, str(Path(folder) / "assets"))
-        for source in MOTION_SOURCES:
-            CONFIGS[source] = _sample_config(source, Path(folder) / source)
-        yield
-
-
-def _sample_config(source: str, folder: Path) -> MotionConfig:
-    setup = SETUPS / f"{source}.py"
-    if not setup.exists():
-        return MotionConfig(source=source)
-    folder.mkdir()
-    spec = importlib.util.spec_from_file_location(f"motion_setup_{source}", setup)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    config = module.motion_config(folder)
-    assert isinstance(config, MotionConfig) and config.source == source
-    return config
+def _configs(package: str, no_assets: Path) -> None:
+    samples = samples_of(package, "MOTION_SAMPLES")
+    for source in names_of(MOTION_SOURCES, package):
+        folder = no_assets / source
+        folder.mkdir()
+        CONFIGS[source] = samples[source](folder) if source in samples else MotionConfig(source=source)
+        assert CONFIGS[source].source == source
 
 
 def _make(source: str, route: Route, fps: float, action: str = "walks") -> BodyMotion:
@@ -61,7 +40,6 @@ def _make(source: str, route: Route, fps: float, action: str = "walks") -> BodyM
     return MOTION_SOURCES[source]().make(told, SKELETON, ROOM, fps, CONFIGS[source], SEED)
 
 
-@sources
 @kinds
 @rates
 def test_feet_are_planted_and_the_body_follows_the_route(source: str, kind: str, fps: float) -> None:
@@ -78,7 +56,6 @@ def test_feet_are_planted_and_the_body_follows_the_route(source: str, kind: str,
     assert away_m.max() < 0.15
 
 
-@sources
 @kinds
 def test_rotations_are_rotations_and_move_smoothly(source: str, kind: str) -> None:
     fps = 60.0
@@ -92,7 +69,6 @@ def test_rotations_are_rotations_and_move_smoothly(source: str, kind: str) -> No
     assert np.abs(np.diff(motion.pelvis_m[:, 2])).max() * fps < 0.9
 
 
-@sources
 @kinds
 def test_knees_bend_forward_and_arms_hang(source: str, kind: str) -> None:
     fps = 24.0
@@ -110,7 +86,6 @@ def test_knees_bend_forward_and_arms_hang(source: str, kind: str) -> None:
         assert np.all(np.sum((wrist_m - motion.pelvis_m)[:, :2] * outward, axis=1) > 0.0), "arms do not cross"
 
 
-@sources
 def test_arms_swing_against_the_legs(source: str) -> None:
     motion = _make(source, sample_route("brisk", 24.0), 24.0)
     joint_m = joint_positions(motion, SKELETON)
@@ -119,7 +94,6 @@ def test_arms_swing_against_the_legs(source: str) -> None:
         assert np.corrcoef(wrist_m[:, 0], ankle_m[:, 0])[0, 1] < -0.8
 
 
-@sources
 def test_frames_of_one_route_agree_at_different_rates(source: str) -> None:
     coarse = _make(source, sample_route("curve", 12.0), 12.0)
     fine = _make(source, sample_route("curve", 24.0), 24.0)
@@ -127,7 +101,6 @@ def test_frames_of_one_route_agree_at_different_rates(source: str) -> None:
     assert np.abs(coarse.pelvis_m - fine.pelvis_m[::2][: len(coarse.pelvis_m)])[inner].max() < 0.01
 
 
-@sources
 def test_the_same_arguments_give_the_same_bits_and_other_seeds_another_motion(source: str) -> None:
     route = sample_route("random", 24.0)
     first, again = _make(source, route, 24.0), _make(source, route, 24.0)
@@ -137,7 +110,6 @@ def test_the_same_arguments_give_the_same_bits_and_other_seeds_another_motion(so
     assert (first.contacts != other.contacts).any()
 
 
-@sources
 @pytest.mark.parametrize("frames", [1, 2, 3, 4])
 @pytest.mark.parametrize("fps", [6.0, 24.0])
 def test_short_sequences_work(source: str, frames: int, fps: float) -> None:
@@ -147,7 +119,6 @@ def test_short_sequences_work(source: str, frames: int, fps: float) -> None:
     assert motion.world_from_joint.shape == (frames, 22, 3, 3) and motion.contacts.any(axis=1).all()
 
 
-@sources
 def test_feet_stand_on_the_height_of_the_route(source: str) -> None:
     flat = sample_route("curve", 24.0)
     raised = Route(0, flat.position_m + np.array([0.0, 0.0, 0.37]), flat.heading_rad)
@@ -156,7 +127,6 @@ def test_feet_stand_on_the_height_of_the_route(source: str) -> None:
     assert np.abs(contact_m[..., 2][motion.contacts] - 0.37).max() < 2e-3
 
 
-@sources
 def test_words_move_the_arms_and_not_the_feet(source: str) -> None:
     route = sample_route("curve", 24.0)
     plain, phone = _make(source, route, 24.0), _make(source, route, 24.0, "walks while talking on the phone")

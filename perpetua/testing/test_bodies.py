@@ -1,12 +1,8 @@
-"""What every body model must keep: one suite over the registry.
+"""What every body model must keep: one suite for all.
 
-A model that needs files has a module of its name in ``body_setups`` with ``actors_config(folder)``, which makes them
-in ``folder`` and returns the config that uses them.
+A model that needs files has a sample, which makes them and returns the config that uses them.
 """
 
-import importlib.util
-import tempfile
-from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -15,37 +11,22 @@ import pytest
 
 from perpetua.actors.bodies.source import BODY_MODELS, Body
 from perpetua.actors.config import ActorsConfig
-from perpetua.machine.assets import ASSET_FOLDER_VARIABLE
 from perpetua.scene.actor import BODY_JOINTS, BODY_PARENTS, BodyMotion
 from perpetua.seeding import StageSeed
+from perpetua.testing.chosen import names_of, samples_of
 
 SEED = StageSeed(seed=3, room=1, stage="actors")
-MODELS = sorted(BODY_MODELS)
-SETUPS = Path(__file__).parent / "body_setups"
 CONFIGS: dict[str, ActorsConfig] = {}
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _configs() -> Iterator[None]:
-    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
-        patch.setenv(ASSET_FOLDER_VARIABLE, str(Path(folder) / "assets"))
-        for model in MODELS:
-            CONFIGS[model] = _sample_config(model, Path(folder) / model)
-        yield
-
-
-def _sample_config(model: str, folder: Path) -> ActorsConfig:
-    setup = SETUPS / f"{model}.py"
-    if not setup.exists():
-        return ActorsConfig(body=model)
-    folder.mkdir()
-    spec = importlib.util.spec_from_file_location(f"body_setup_{model}", setup)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    config = module.actors_config(folder)
-    assert isinstance(config, ActorsConfig) and config.body == model
-    return config
+def _configs(package: str, no_assets: Path) -> None:
+    samples = samples_of(package, "BODY_SAMPLES")
+    for model in names_of(BODY_MODELS, package):
+        folder = no_assets / model
+        folder.mkdir()
+        CONFIGS[model] = samples[model](folder) if model in samples else ActorsConfig(body=model)
+        assert CONFIGS[model].body == model
 
 
 @lru_cache(maxsize=8)
@@ -71,7 +52,6 @@ def joint(name: str) -> int:
     return BODY_JOINTS.index(name)
 
 
-@pytest.mark.parametrize("model", MODELS)
 def test_the_same_arguments_give_the_same_bits(model: str) -> None:
     first, again = body(model, 0), BODY_MODELS[model]().draw(0, CONFIGS[model], SEED)
     assert again.description == first.description
@@ -82,14 +62,12 @@ def test_the_same_arguments_give_the_same_bits(model: str) -> None:
         assert np.array_equal(one.material.image, two.material.image)
 
 
-@pytest.mark.parametrize("model", MODELS)
 def test_actors_of_a_room_differ(model: str) -> None:
     first, second = body(model, 0), body(model, 1)
     assert first.description != second.description
     assert abs(np.ptp(first.pose(t_pose(first))[0, :, 2]) - np.ptp(second.pose(t_pose(second))[0, :, 2])) > 0.01
 
 
-@pytest.mark.parametrize("model", MODELS)
 def test_a_t_pose_faces_x_with_level_arms_and_soles_on_the_floor(model: str) -> None:
     person = body(model, 0)
     joints = person.skeleton.joint_m
@@ -106,7 +84,6 @@ def test_a_t_pose_faces_x_with_level_arms_and_soles_on_the_floor(model: str) -> 
         assert abs(arm[1]) / np.linalg.norm(arm) > 0.98
 
 
-@pytest.mark.parametrize("model", MODELS)
 def test_heels_and_toes_are_points_of_the_soles(model: str) -> None:
     person = body(model, 0)
     posed = person.pose(t_pose(person))[0].astype(np.float64)
@@ -116,7 +93,6 @@ def test_heels_and_toes_are_points_of_the_soles(model: str) -> None:
     assert 0.10 < toe[0] - heel[0] < 0.32 and heel[1] > 0
 
 
-@pytest.mark.parametrize("model", MODELS)
 def test_contacts_move_rigidly_with_ankle_and_foot(model: str) -> None:
     person = body(model, 0)
     joints, contacts = person.skeleton.joint_m, person.skeleton.contact_m
@@ -132,7 +108,6 @@ def test_contacts_move_rigidly_with_ankle_and_foot(model: str) -> None:
         assert np.abs(posed[near] - wanted).max() < 0.003
 
 
-@pytest.mark.parametrize("model", MODELS)
 def test_turning_and_moving_the_whole_body_turns_and_moves_every_vertex(model: str) -> None:
     person = body(model, 0)
     rest = person.pose(t_pose(person))[0].astype(np.float64)
@@ -142,7 +117,6 @@ def test_turning_and_moving_the_whole_body_turns_and_moves_every_vertex(model: s
     assert np.abs(posed - (rest @ turn.T + shift)).max() < 1e-5
 
 
-@pytest.mark.parametrize("model", MODELS)
 def test_a_frame_does_not_depend_on_the_others(model: str) -> None:
     person = body(model, 0)
     rng = np.random.default_rng(0)
@@ -153,7 +127,6 @@ def test_a_frame_does_not_depend_on_the_others(model: str) -> None:
     assert together[1].tobytes() == alone[0].tobytes()
 
 
-@pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("actor", [0, 1])
 def test_people_are_dressed(model: str, actor: int) -> None:
     person = body(model, actor)
@@ -167,7 +140,6 @@ def test_people_are_dressed(model: str, actor: int) -> None:
     assert len(person.parts) >= 5
 
 
-@pytest.mark.parametrize("model", MODELS)
 def test_parts_use_every_vertex_and_have_real_textures(model: str) -> None:
     person = body(model, 0)
     count = person.pose(t_pose(person)).shape[1]
@@ -180,7 +152,6 @@ def test_parts_use_every_vertex_and_have_real_textures(model: str) -> None:
         assert part.material.image is not None and part.material.image.astype(float).std() > 1.0, part.name
 
 
-@pytest.mark.parametrize("model", MODELS)
 def test_the_skeleton_is_a_tree_of_human_size(model: str) -> None:
     joints = body(model, 0).skeleton.joint_m
     lengths = [
