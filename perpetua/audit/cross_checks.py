@@ -6,10 +6,9 @@ from jaxtyping import Bool, Float64, Int64
 from perpetua.audit.config import AuditConfig
 from perpetua.audit.files import SequenceFiles
 from perpetua.audit.flow_checks import depth_around, world_of_pixels
-from perpetua.audit.geometry import project_to_pixels
+from perpetua.audit.geometry import NEIGHBOUR_PIXELS, project_to_pixels
 from perpetua.audit.report import Check
 from perpetua.audit.tally import Tally, check_of, chosen_frames
-from perpetua.audit.visibility_checks import AROUND
 
 # About this many pixels along each side of an image are tested in the other views.
 LOOKED_AT_PX = 128
@@ -142,6 +141,6 @@ def _labels_around(
     """Labels at the four pixel centres around each track, and which of them lie on the image."""
     height, width = picture.shape[:2]
     pixel_px = np.nan_to_num(_pixels(files, view, frame), nan=-9.0).clip(-9.0, 1e9)
-    corner = np.floor(pixel_px).astype(np.int64)[:, None] + AROUND
+    corner = np.floor(pixel_px).astype(np.int64)[:, None] + NEIGHBOUR_PIXELS
     on_image = ((corner >= 0) & (corner < [width, height])).all(axis=2)
     return np.asarray(picture)[corner[..., 1].clip(0, height - 1), corner[..., 0].clip(0, width - 1)], on_image

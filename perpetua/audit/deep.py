@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float64, Int64
 from perpetua.audit.config import AuditConfig
 from perpetua.audit.deep_scene import DeepScene
 from perpetua.audit.files import SequenceFiles
-from perpetua.audit.geometry import camera_centre_m, depth_of_planes, project_to_pixels
+from perpetua.audit.geometry import NEIGHBOUR_PIXELS, camera_centre_m, depth_of_planes, project_to_pixels
 from perpetua.audit.on_meshes import check_on_meshes
 from perpetua.audit.report import Check
 from perpetua.audit.tally import Tally, check_of
@@ -26,7 +26,6 @@ BEND_FRACTION = 0.01
 REACHED_M = 1e-4
 # A pixel shows a track's own surface where what its ray meets is this near to the plane of the track's triangle.
 SAME_DEPTH_M = 2e-3
-AROUND = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 
 
 @dataclass(frozen=True)
@@ -241,13 +240,13 @@ def _evidence(
     object_index, face = table["object_index"][chosen], table["face"][chosen]
     reached, shown, plain = (np.zeros(len(point_m), bool) for _ in range(3))
     reached[chosen] = rays.reach(frame, camera_centre_m(camera[1]), point_m[chosen], object_index, face).reached
-    corner = np.floor(seen[chosen, :2]).astype(np.int64)[:, None] + AROUND
+    corner = np.floor(seen[chosen, :2]).astype(np.int64)[:, None] + NEIGHBOUR_PIXELS
     on_image = ((corner >= 0) & (corner < [width, height])).all(axis=2)
     column, row = np.clip(corner[..., 0], 0, width - 1), np.clip(corner[..., 1], 0, height - 1)
     own = on_image & (owner[row, column] == object_index[:, None])
     shown[chosen] = own.any(axis=1)
     triangle_m = np.asarray(files.arrays["surface_xyz.npy"][frame], np.float64)[chosen]
-    planes_m = [depth_of_planes(*camera, triangle_m, column[:, k], row[:, k]) for k in range(len(AROUND))]
+    planes_m = [depth_of_planes(*camera, triangle_m, column[:, k], row[:, k]) for k in range(len(NEIGHBOUR_PIXELS))]
     off_m = np.abs(predicted_m[row, column] - np.stack(planes_m, axis=1))
     plain[chosen] = (own & (off_m <= SAME_DEPTH_M)).any(axis=1)
     return _Evidence(reached, shown, plain)

@@ -8,11 +8,11 @@ from jaxtyping import Bool, Float64, UInt8
 
 from perpetua.audit.config import AuditConfig
 from perpetua.audit.files import SequenceFiles
-from perpetua.audit.geometry import project_to_pixels, to_world, unproject_depth
+from perpetua.audit.geometry import NEIGHBOUR_PIXELS, project_to_pixels, to_world, unproject_depth
 from perpetua.audit.label_checks import LABELLED
 from perpetua.audit.report import Check
 from perpetua.audit.tally import Tally, check_of, chosen_frames
-from perpetua.audit.visibility_checks import AROUND, SHARP
+from perpetua.audit.visibility_checks import SHARP
 
 NONE, SEEN, HIDDEN, OUTSIDE = range(4)
 # Flow agrees with depth and cameras within this many pixels, plus the pixels that this error of depth causes.
@@ -180,7 +180,7 @@ def depth_around(
     depth_m = np.asarray(files.arrays[f"{view}/depth.npy"][frame], np.float64)
     height, width = depth_m.shape
     corner = np.floor(np.nan_to_num(pixel_px, nan=-9.0, posinf=-9.0, neginf=-9.0).clip(-9.0, 1e9)).astype(np.int64)
-    corner = corner[..., None, :] + AROUND
+    corner = corner[..., None, :] + NEIGHBOUR_PIXELS
     complete = ((corner >= 0) & (corner < [width, height])).all(axis=(-1, -2))
     found_m = depth_m[corner[..., 1].clip(0, height - 1), corner[..., 0].clip(0, width - 1)]
     return np.where(found_m > 0.0, found_m, np.inf), complete

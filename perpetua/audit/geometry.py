@@ -3,6 +3,9 @@
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int64
 
+# From the pixel at or before a position to the four pixel centres around it: x, y.
+NEIGHBOUR_PIXELS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+
 
 def project_to_pixels(
     intrinsics_px: Float[np.ndarray, "4"],

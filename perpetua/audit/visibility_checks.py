@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float64
 
 from perpetua.audit.config import AuditConfig
 from perpetua.audit.files import SequenceFiles
-from perpetua.audit.geometry import camera_centre_m, depth_of_planes, project_to_pixels
+from perpetua.audit.geometry import NEIGHBOUR_PIXELS, camera_centre_m, depth_of_planes, project_to_pixels
 from perpetua.audit.report import Check
 from perpetua.audit.tally import Tally, check_of
 
@@ -16,7 +16,6 @@ from perpetua.audit.tally import Tally, check_of
 SHARP = 0.1
 # A pixel covers more of a surface that it sees at an angle, up to this cosine.
 STEEPEST = 0.17
-AROUND = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def _evidence(files: SequenceFiles, view: str, frame: int) -> _Evidence:
             & (np.abs(seen[:, 0] - (width - 1) / 2) < width / 2)
             & (np.abs(seen[:, 1] - (height - 1) / 2) < height / 2)
         )
-    corner = np.floor(np.where(inside[:, None], seen[:, :2], 0.0)).astype(np.int64)[:, None] + AROUND
+    corner = np.floor(np.where(inside[:, None], seen[:, :2], 0.0)).astype(np.int64)[:, None] + NEIGHBOUR_PIXELS
     on_image = ((corner >= 0) & (corner < [width, height])).all(axis=2)
     column, row = np.clip(corner[..., 0], 0, width - 1), np.clip(corner[..., 1], 0, height - 1)
     width_m = np.sqrt(2.0) * np.abs(seen[:, 2:3]) / float(intrinsics[0])

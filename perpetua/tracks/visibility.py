@@ -29,7 +29,7 @@ from perpetua.tracks.around import Around, ViewFrame
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.placed import PlacedPoints, Placement, as_exported
 from perpetua.tracks.sides import ClosedSides
-from perpetua.tracks.sight import HairFaces, SceneSight, SightHits
+from perpetua.tracks.sight import HairFaces, SceneSight
 from perpetua.tracks.surface import BoundPoints
 from perpetua.tracks.types import SightReport
 
@@ -117,10 +117,17 @@ def visible_in_frame(
     )
     visible = np.zeros((len(views), len(placed.point_m)), bool)
     visible[around.view, around.point] = reached & agrees
-    strands = hair.has(points.object_index, points.face) | (~reached & hair.has(hits.object_index, hits.face))
-    return visible, _count(
-        visible.size, reached, agrees, turned, strands, cosine, length_m, hits, shows, as_meshed, around
+    findings = _Findings(
+        reached=reached,
+        agrees=agrees,
+        hair=hair.has(points.object_index, points.face) | (~reached & hair.has(hits.object_index, hits.face)),
+        coincident=(length_m - hits.distance_m < COINCIDENT_M) | turned,
+        grazing=cosine < GRAZING_COSINE,
+        blocker_shown=(around.valid & (around.shown == hits.object_index[:, None])).any(axis=1),
+        object_shown=shows.any(axis=1),
+        as_meshed=as_meshed,
     )
+    return visible, _count(visible.size, findings)
 
 
 def _on_plane(
@@ -147,8 +154,8 @@ def _on_neighbours(
     sight: SceneSight,
     frame: int,
 ) -> tuple[Bool[np.ndarray, " U"], Bool[np.ndarray, " U"]]:
-    """Whether a pixel around that shows the point's object was rendered just where its ray meets triangles near by;
-    and whether all that show it were rendered just where their rays meet it, near by or not."""
+    """Whether some pixel around that shows the point's object was rendered where its ray meets a triangle near the
+    point; and whether all pixels around that show it were rendered where their rays meet it, near or not."""
     member, corner = np.nonzero(shows[chosen])
     pair = chosen[member]
     direction, eye_m = around.direction[pair, corner], around.eye_m[pair]
@@ -166,30 +173,34 @@ def _on_neighbours(
     return confirmed, as_meshed
 
 
-def _count(
-    entries: int,
-    reached: Bool[np.ndarray, " N"],
-    agrees: Bool[np.ndarray, " N"],
-    turned: Bool[np.ndarray, " N"],
-    strands: Bool[np.ndarray, " N"],
-    cosine: Float64[np.ndarray, " N"],
-    length_m: Float64[np.ndarray, " N"],
-    hits: SightHits,
-    shows: Bool[np.ndarray, "N 4"],
-    as_meshed: Bool[np.ndarray, " N"],
-    around: Around,
-) -> SightReport:
+@dataclass(frozen=True)
+class _Findings:
+    """What the witnesses say of points inside images, and what may explain that they differ.
+
+    ``hair``: the point, or what blocks its ray, is hair. ``coincident``: the ray is blocked close before the point, or
+    the point is on a hidden back. ``blocker_shown`` and ``object_shown``: a pixel around shows what the ray meets, or
+    the point's object. ``as_meshed``: all pixels around that show the object were rendered where the mesh is.
+    """
+
+    reached: Bool[np.ndarray, " N"]
+    agrees: Bool[np.ndarray, " N"]
+    hair: Bool[np.ndarray, " N"]
+    coincident: Bool[np.ndarray, " N"]
+    grazing: Bool[np.ndarray, " N"]
+    blocker_shown: Bool[np.ndarray, " N"]
+    object_shown: Bool[np.ndarray, " N"]
+    as_meshed: Bool[np.ndarray, " N"]
+
+
+def _count(entries: int, found: _Findings) -> SightReport:
     """Counts entries by what the witnesses said and, where they differ, by the first reason that applies."""
-    blocked, unseen = agrees & ~reached, reached & ~agrees
-    near = length_m - hits.distance_m < COINCIDENT_M
-    grazing = cosine < GRAZING_COSINE
-    blocker_shown = (around.valid & (around.shown == hits.object_index[:, None])).any(axis=1)
-    of_blocked = _first_reason(blocked, strands, near | turned, grazing, ~blocker_shown)
-    of_unseen = _first_reason(unseen, strands, grazing, ~shows.any(axis=1), as_meshed)
+    blocked, unseen = found.agrees & ~found.reached, found.reached & ~found.agrees
+    of_blocked = _first_reason(blocked, found.hair, found.coincident, found.grazing, ~found.blocker_shown)
+    of_unseen = _first_reason(unseen, found.hair, found.grazing, ~found.object_shown, found.as_meshed)
     return SightReport(
         entries=entries,
-        inside=len(reached),
-        visible=int((reached & agrees).sum()),
+        inside=len(found.reached),
+        visible=int((found.reached & found.agrees).sum()),
         blocked_hair=of_blocked[0],
         blocked_coincident=of_blocked[1],
         blocked_grazing=of_blocked[2],
@@ -204,7 +215,7 @@ def _count(
 
 
 def _first_reason(cases: Bool[np.ndarray, " N"], *reasons: Bool[np.ndarray, " N"]) -> list[int]:
-    """How many cases have each reason and none before it; at last those without any."""
+    """How many cases have each reason but none of those before it; the last count is of cases without a reason."""
     counts, left = [], cases
     for reason in reasons:
         counts.append(int((left & reason).sum()))
