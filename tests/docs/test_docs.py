@@ -2,7 +2,6 @@
 
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +15,8 @@ from perpetua.cli.app import main
 from perpetua.config import load_config
 from perpetua.config.reference import markdown_page
 from perpetua.formats.reader import read_sequence
-from perpetua.formats.source import EXPORTERS, ExportSource
-from perpetua.motion.source import MOTION_SOURCES
-from perpetua.navigation.config import NavigationConfig
 from perpetua.pipeline.stages import STAGE_NAMES
-from perpetua.registry import Registry
-from perpetua.rooms.acceptance.build import build_room, check_source
-from perpetua.rooms.config import RoomsConfig
-from perpetua.rooms.source import ROOM_SOURCES
-from perpetua.seeding import StageSeed
-from perpetua.testing.motion_samples import empty_room, sample_route, sample_skeleton
+from perpetua.rooms.acceptance.build import check_source
 from perpetua.testing.synthetic_sequence import write_scene
 from tests.support.doc_pages import ALL_PAGES, PROGRAMS, ROOT, DocCommand, blocks, commands
 from tests.support.makehuman_files import write_folder
@@ -165,42 +156,11 @@ def test_the_reader_of_the_page_reads_what_ours_does(tmp_path: Path) -> None:
     assert depth_m[frame, number] > 0
 
 
-@pytest.fixture(scope="module")
-def extensions() -> Iterator[None]:
-    """The page's classes, in the registries as long as this module runs."""
-    registries: tuple[Registry[Any], ...] = (ROOM_SOURCES, MOTION_SOURCES, EXPORTERS)
-    before = [dict(registry._entered) for registry in registries]
-    names: dict[str, Any] = {}
-    for code in blocks("docs/extending.md", "python"):
-        exec(code, names)
-    yield
-    for registry, entries in zip(registries, before, strict=True):
-        registry._entered.clear()
-        registry._entered.update(entries)
-
-
-def test_the_room_source_of_the_page_makes_rooms(extensions: None, tmp_path: Path) -> None:
-    config = RoomsConfig(source="hall")
-    check_source(config)
-    rooms = [build_room(config, NavigationConfig(), StageSeed(1, room, "room"), tmp_path) for room in (0, 0, 1)]
-    column_m = [next(obj.mesh.vertices_m for obj in room.objects if obj.category == "column") for room in rooms]
-    assert np.array_equal(column_m[0], column_m[1])
-    assert not np.array_equal(column_m[0], column_m[2])
-
-
-def test_the_motion_source_of_the_page_follows_its_route(extensions: None) -> None:
-    route, config = sample_route("curve", 24.0), load_config("tiny").actors.motion
-    source = MOTION_SOURCES["glide"]()
-    source.check(config)
-    motion = source.make(route, sample_skeleton(), empty_room(), 24.0, config, StageSeed(1, 0, "motion"))
-    assert np.allclose(motion.pelvis_m[:, :2], route.position_m[:, :2])
-    forward = motion.world_from_joint[:, 0, :2, 0]
-    assert np.allclose(np.arctan2(forward[:, 1], forward[:, 0]), route.heading_rad, atol=1e-9)
-
-
-def test_the_exporter_of_the_page_writes_the_tracks(extensions: None, tmp_path: Path) -> None:
-    write_scene(tmp_path / "sequence")
-    sequence = read_sequence(tmp_path / "sequence")
-    EXPORTERS["csv"]().write(ExportSource("made", sequence), tmp_path)
-    rows = np.loadtxt(tmp_path / "made.csv", delimiter=",", skiprows=1)
-    assert np.allclose(rows[:, 2:].reshape(sequence.tracks_m.shape), sequence.tracks_m, atol=1e-4)
+def test_the_page_on_extending_shows_the_files_of_the_package_that_is_tested() -> None:
+    """tests/packaging installs that package, passes it through the suites, and makes a sequence with it."""
+    package = ROOT / "tests" / "plugin"
+    modules = [path for path in sorted(package.rglob("*.py")) if path.name != "__init__.py"]
+    shown = [*blocks("docs/extending.md", "python"), *blocks("docs/extending.md", "toml")]
+    files = [path.read_text(encoding="utf-8") for path in (*modules, package / "pyproject.toml")]
+    assert len(files) == 5
+    assert sorted(text.strip() for text in shown) == sorted(text.strip() for text in files)
