@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from perpetua.config import load_config
 from perpetua.pipeline.layout import OutputLayout
 from perpetua.pipeline.stages import STAGES
 from perpetua.pipeline.store import StageFolder, output_hashes
+from tests.support.waiting import wait_for
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 
@@ -83,10 +83,8 @@ def test_killed_while_rendering_ends_in_the_same_bytes(finished: Path, tmp_path:
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-    deadline = time.monotonic() + 600
-    while len(_frames_rendered(log)) < 2:
-        assert run.poll() is None and time.monotonic() < deadline
-        time.sleep(0.05)
+    wait_for(lambda: run.poll() is not None or len(_frames_rendered(log)) >= 2, "two frames", most_s=600.0)
+    assert run.poll() is None
     os.kill(run.pid, signal.SIGKILL)
     run.wait()
     before = _frames_rendered(log)
@@ -131,19 +129,19 @@ def test_told_to_stop_it_stops_cleanly_and_says_how_to_go_on(
         start_new_session=True,
         preexec_fn=_heed_interrupts,
     )
-    deadline = time.monotonic() + 120
     log = tmp_path / "log.jsonl"
-    while not (log.exists() and '"stage_started"' in log.read_text()):
-        assert run.poll() is None and time.monotonic() < deadline
-        time.sleep(0.05)
+    wait_for(lambda: run.poll() is not None or _a_stage_has_begun(log), "the first stage")
+    assert run.poll() is None
     send(run.pid, number)
-    out, err = run.communicate(timeout=60)
+    out, err = run.communicate(timeout=120)
     assert run.returncode == 130, out + err
     assert "To go on, run the same command again" in out
     assert err == ""
-    while _group_lives(run.pid):
-        assert time.monotonic() < deadline, "a process of the run is left"
-        time.sleep(0.05)
+    wait_for(lambda: not _group_lives(run.pid), "the end of every process of the run")
+
+
+def _a_stage_has_begun(log: Path) -> bool:
+    return log.exists() and '"stage_started"' in log.read_text()
 
 
 def _heed_interrupts() -> None:

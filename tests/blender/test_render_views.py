@@ -4,9 +4,7 @@ import logging
 import multiprocessing
 import os
 import signal
-import subprocess
 import sys
-import time
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -35,6 +33,7 @@ from tests.support.plane_scene import (
     plane_room,
     two_cameras,
 )
+from tests.support.waiting import has_ended, wait_for
 
 pytestmark = pytest.mark.blender
 
@@ -183,12 +182,9 @@ def test_when_the_parent_is_killed_blender_ends_and_another_run_resumes(
     process.start()
     process.join(60.0)
     assert process.exitcode == -signal.SIGKILL
-    deadline = time.monotonic() + 5.0
-    pids = (tmp_path / "child").read_text().split()
+    pids = [int(pid) for pid in (tmp_path / "child").read_text().split()]
     assert pids
-    while subprocess.run(["ps", "-o", "stat=", "-p", ",".join(pids)], capture_output=True).stdout.strip(b" Z\n"):
-        assert time.monotonic() < deadline, "Blender outlived its parent"
-        time.sleep(0.05)
+    wait_for(lambda: all(has_ended(pid) for pid in pids), "Blender to end after its parent", most_s=60.0)
     kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "frames").glob("0*")}
     assert len(kept) >= 1
     progress: list[int] = []

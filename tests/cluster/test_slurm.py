@@ -21,7 +21,8 @@ from perpetua.pipeline.stages import STAGE_NAMES
 from perpetua.pipeline.store import output_hashes
 from tests.support.installed_wheel import build_wheel, copy_sources, install_wheel
 from tests.support.paths import BENCHMARKS
-from tests.support.slurm_cluster import SlurmCluster, missing_programs, slurm_cluster, wait_for
+from tests.support.slurm_cluster import SlurmCluster, missing_programs, slurm_cluster
+from tests.support.waiting import wait_for
 
 pytestmark = [pytest.mark.cluster, pytest.mark.blender, pytest.mark.slow]
 
@@ -102,7 +103,7 @@ def _when(cluster: SlurmCluster, is_so: Callable[[], bool], what: str) -> None:
         return is_so()
 
     try:
-        wait_for(looked, PATIENCE_S, what)
+        wait_for(looked, what, PATIENCE_S, 0.25)
     except AssertionError as error:
         raise AssertionError(f"{error}\n{cluster.describe()}") from None
 

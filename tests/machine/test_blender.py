@@ -4,7 +4,6 @@ import signal
 import subprocess
 import sys
 import textwrap
-import time
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ import pytest
 from perpetua.errors import AssetError, EnvironmentSetupError
 from perpetua.machine.blender import BlenderError, Event, run_script
 from perpetua.resources import SCRIPT_FOLDER
+from tests.support.waiting import has_ended, wait_for
 
 
 def _run(tmp_path: Path, body: str, timeout_s: float = 20.0, blender: str | None = None) -> list[Event]:
@@ -30,10 +30,7 @@ def _run(tmp_path: Path, body: str, timeout_s: float = 20.0, blender: str | None
 
 
 def _wait_until_gone(pid: int) -> None:
-    deadline = time.monotonic() + 5.0
-    while Path(f"/proc/{pid}").exists() and "State:\tZ" not in Path(f"/proc/{pid}/status").read_text():
-        assert time.monotonic() < deadline, f"process {pid} is still there"
-        time.sleep(0.02)
+    wait_for(lambda: has_ended(pid), f"the end of process {pid}", most_s=50.0)
 
 
 def test_only_events_are_handed_on(tmp_path: Path) -> None:
@@ -104,26 +101,25 @@ def test_missing_system_library_names_the_packages(tmp_path: Path) -> None:
 
 def test_silence_ends_the_process_and_its_children(tmp_path: Path) -> None:
     body = f"""
-        child = subprocess.Popen([{sys.executable!r}, "-c", "import time; time.sleep(60)"])
+        child = subprocess.Popen([{sys.executable!r}, "-c", "import time; time.sleep(600)"])
         open({str(tmp_path / "pids")!r}, "w").write(f"{{os.getpid()}} {{child.pid}}")
         print("not an event", flush=True)
-        time.sleep(60)
+        time.sleep(600)
         """
-    started = time.monotonic()
-    with pytest.raises(BlenderError, match="no progress for 1 s"):
-        _run(tmp_path, body, timeout_s=1.0)
-    assert time.monotonic() - started < 10.0
+    with pytest.raises(BlenderError, match="no progress for 2 s"):
+        _run(tmp_path, body, timeout_s=2.0)
     for pid in (tmp_path / "pids").read_text().split():
         _wait_until_gone(int(pid))
 
 
 def test_events_keep_a_slow_process_alive(tmp_path: Path) -> None:
     body = """
-        for k in range(6):
-            time.sleep(0.3)
+        for k in range(12):
+            time.sleep(0.25)
             print(json.dumps({"event": "tick", "k": k}), flush=True)
         """
-    assert len(_run(tmp_path, body, timeout_s=1.0)) == 6
+    # Silent for an eighth of the time allowed at a time, and longer than it on the whole.
+    assert len(_run(tmp_path, body, timeout_s=2.0)) == 12
 
 
 def test_interrupt_ends_the_process(tmp_path: Path) -> None:
@@ -169,22 +165,15 @@ run_script(script, script, blender=None, scratch=script.parent, silence_timeout_
         for mark in ("loading", "loaded", "working"):
             (tmp_path / mark).unlink(missing_ok=True)
         parent = subprocess.Popen([sys.executable, "-c", call], stdout=subprocess.DEVNULL)
-        _wait_for(tmp_path / "loading")
+        wait_for((tmp_path / "loading").exists, "Blender to be loading")
         child = int(Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text())
         if killed:
             parent.kill()
             parent.wait()
         (tmp_path / "loaded").touch()
         _wait_until_gone(child)
-        assert parent.wait(timeout=20) == (-signal.SIGKILL if killed else 0)
+        assert parent.wait(timeout=120) == (-signal.SIGKILL if killed else 0)
         assert (tmp_path / "working").exists() is not killed
-
-
-def _wait_for(path: Path) -> None:
-    deadline = time.monotonic() + 20.0
-    while not path.exists():
-        assert time.monotonic() < deadline, f"{path} does not come"
-        time.sleep(0.02)
 
 
 def test_a_blender_program_gets_the_job_after_two_dashes(tmp_path: Path) -> None:

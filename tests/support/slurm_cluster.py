@@ -6,13 +6,14 @@ import shutil
 import signal
 import socket
 import subprocess
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
+
+from tests.support.waiting import wait_for
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "srun", "sbatch", "scontrol", "squeue", "scancel", "sinfo")
 # Debian puts daemons where a user's PATH may not look.
@@ -102,7 +103,7 @@ class SlurmCluster:
     def power_on(self, node: str) -> None:
         """Starts the node's daemon, and gives the node back to the cluster once it answers."""
         self.start_node(node)
-        wait_for(lambda: "*" not in self.run("sinfo", "--noheader", f"--nodes={node}", "--format=%T"), 120, node)
+        wait_for(lambda: "*" not in self.run("sinfo", "--noheader", f"--nodes={node}", "--format=%T"), node, 120, 0.25)
         self.run("scontrol", "update", f"NodeName={node}", "State=RESUME")
 
     def start_node(self, node: str) -> None:
@@ -137,11 +138,11 @@ def slurm_cluster(folder: Path, nodes: tuple[str, ...]) -> Iterator[SlurmCluster
     daemons: list[subprocess.Popen[bytes]] = []
     try:
         daemons.append(_start(folder, environment, "munged", "--foreground", "--force", *_munge_options(folder)))
-        wait_for(lambda: (folder / "munge.socket").exists(), 30, "munged")
+        wait_for(lambda: (folder / "munge.socket").exists(), "munged", 30)
         daemons.append(_start(folder, environment, "slurmctld", "-D"))
         for node in nodes:
             cluster.start_node(node)
-        wait_for(lambda: _idle_nodes(cluster) == len(nodes), 120, "all nodes to be idle")
+        wait_for(lambda: _idle_nodes(cluster) == len(nodes), "all nodes to be idle", 120, 0.25)
         yield cluster
     finally:
         # Nodes first, while the controller can still tell them what they run.
@@ -151,14 +152,6 @@ def slurm_cluster(folder: Path, nodes: tuple[str, ...]) -> Iterator[SlurmCluster
             daemon.send_signal(signal.SIGTERM)
         for daemon in reversed(daemons):
             _end(daemon)
-
-
-def wait_for(is_so: Callable[[], bool], most_s: float, what: str) -> None:
-    """Waits until something is so."""
-    deadline = time.monotonic() + most_s
-    while not is_so():
-        assert time.monotonic() < deadline, f"waited {most_s:g} s for {what}"
-        time.sleep(0.25)
 
 
 def _write_config(folder: Path, nodes: tuple[str, ...]) -> None:
