@@ -61,38 +61,73 @@ def make_trunk(
         left_lead_m: how far the left foot is ahead of the right along the heading.
         time_s: evenly spaced times.
     """
-    per_second = 1.0 / (time_s[1] - time_s[0])
-    timeline = poise.timeline
-    heading_rad = path.heading_rad(time_s)
-    speed_mps, run = path.speed_mps(time_s), path.run_weight(time_s)
-    stillness = path.stillness(time_s)
-    idle = _idle_shift(style, time_s) * (1.0 - poise.seated)
-    # From -1 (weight on the right foot) to 1 (on the left).
-    load = feet[0].on_floor.astype(np.float64) - feet[1].on_floor.astype(np.float64)
-    load = gaussian_filter1d(load, 0.13 * per_second) + 0.7 * stillness * idle
-    pace = np.clip(speed_mps / 1.2, 0.0, 1.0)
-    sway_m = load * (style.sway_m + 0.014 * (1.0 - pace)) * (1.0 - 0.5 * run) + 0.25 * timeline.sway_rad
-    pelvis_xy_m = path.position_m(time_s)[:, :2] + sway_m[:, None] * np.stack(
-        [-np.sin(heading_rad), np.cos(heading_rad)], axis=1
-    )
-    turn_rad = style.pelvis_turn_rad_per_m * gaussian_filter1d(left_lead_m, 0.04 * per_second)
-    list_rad = style.pelvis_list_rad * load
-    push = gaussian_filter1d(path.forward_acceleration_mps2(time_s), 0.2 * per_second)
-    lean_rad = style.lean_rad + 0.03 * pace + _RUN_LEAN_RAD * run + np.clip(0.03 * push, -0.08, 0.1)
-    lean_rad = lean_rad * (1.0 - poise.seated) + poise.lean_rad + timeline.lean_rad
-    breath_rad = 0.006 * np.sin(2.0 * np.pi * time_s / 3.6 + style.idle_phase[2])
+    gait = _sampled(path, style, poise, feet, time_s)
+    left = np.stack([-np.sin(gait.heading_rad), np.cos(gait.heading_rad)], axis=1)
+    pelvis_xy_m = path.position_m(time_s)[:, :2] + _sway_m(gait, style, poise)[:, None] * left
+    turn_rad = style.pelvis_turn_rad_per_m * gaussian_filter1d(left_lead_m, 0.04 * gait.per_second)
+    list_rad = style.pelvis_list_rad * gait.load
+    lean_rad = _lean_rad(path, gait, style, poise, time_s)
     world_from_pelvis = (
-        about_z(heading_rad - turn_rad) @ about_y(_PELVIS_LEAN * lean_rad + poise.tilt_rad) @ about_x(list_rad)
+        about_z(gait.heading_rad - turn_rad) @ about_y(_PELVIS_LEAN * lean_rad + poise.tilt_rad) @ about_x(list_rad)
     )
-    chest_turn_rad = turn_rad + 0.05 * stillness * idle + timeline.turn_rad
+    breath_rad = 0.006 * np.sin(2.0 * np.pi * time_s / 3.6 + style.idle_phase[2])
+    chest_turn_rad = turn_rad + 0.05 * gait.stillness * gait.idle + poise.timeline.turn_rad
     chest_turn_rad += np.clip(_CHEST_FOLLOWS * poise.gaze.weight * poise.gaze.yaw_rad, -0.5, 0.5)
     world_from_chest = (
-        about_z(heading_rad + chest_turn_rad)
+        about_z(gait.heading_rad + chest_turn_rad)
         @ about_y(lean_rad + breath_rad)
-        @ about_x(-0.3 * list_rad + timeline.sway_rad)
+        @ about_x(-0.3 * list_rad + poise.timeline.sway_rad)
     )
-    head = _head(path, style, poise, heading_rad, stillness, time_s)
-    return Trunk(heading_rad, pelvis_xy_m, world_from_pelvis, world_from_chest, head)
+    head = _head(path, style, poise, gait.heading_rad, gait.stillness, time_s)
+    return Trunk(gait.heading_rad, pelvis_xy_m, world_from_pelvis, world_from_chest, head)
+
+
+@dataclass(frozen=True)
+class _Gait:
+    """The route and the feet at evenly spaced times, ``per_second`` of them.
+
+    ``run`` is the weight of running; ``load`` goes from -1 (weight on the right foot) to 1 (on the left); ``idle`` is
+    the slow change between the feet of a standing body.
+    """
+
+    per_second: float
+    heading_rad: Float64[np.ndarray, " N"]
+    run: Float64[np.ndarray, " N"]
+    stillness: Float64[np.ndarray, " N"]
+    idle: Float64[np.ndarray, " N"]
+    load: Float64[np.ndarray, " N"]
+    pace: Float64[np.ndarray, " N"]
+
+
+def _sampled(
+    path: RoutePath,
+    style: GaitStyle,
+    poise: Poise,
+    feet: tuple[FootTrack, FootTrack],
+    time_s: Float64[np.ndarray, " N"],
+) -> _Gait:
+    per_second = 1.0 / (time_s[1] - time_s[0])
+    stillness = path.stillness(time_s)
+    idle = _idle_shift(style, time_s) * (1.0 - poise.seated)
+    load = feet[0].on_floor.astype(np.float64) - feet[1].on_floor.astype(np.float64)
+    load = gaussian_filter1d(load, 0.13 * per_second) + 0.7 * stillness * idle
+    pace = np.clip(path.speed_mps(time_s) / 1.2, 0.0, 1.0)
+    return _Gait(per_second, path.heading_rad(time_s), path.run_weight(time_s), stillness, idle, load, pace)
+
+
+def _sway_m(gait: _Gait, style: GaitStyle, poise: Poise) -> Float64[np.ndarray, " N"]:
+    """How far the pelvis is to the left, over the standing foot."""
+    sway_m = gait.load * (style.sway_m + 0.014 * (1.0 - gait.pace)) * (1.0 - 0.5 * gait.run)
+    return sway_m + 0.25 * poise.timeline.sway_rad
+
+
+def _lean_rad(
+    path: RoutePath, gait: _Gait, style: GaitStyle, poise: Poise, time_s: Float64[np.ndarray, " N"]
+) -> Float64[np.ndarray, " N"]:
+    """The trunk's lean forward: with the pace, into a push, as a seat or an action asks."""
+    push = gaussian_filter1d(path.forward_acceleration_mps2(time_s), 0.2 * gait.per_second)
+    lean_rad = style.lean_rad + 0.03 * gait.pace + _RUN_LEAN_RAD * gait.run + np.clip(0.03 * push, -0.08, 0.1)
+    return np.asarray(lean_rad * (1.0 - poise.seated) + poise.lean_rad + poise.timeline.lean_rad)
 
 
 def spine_between(

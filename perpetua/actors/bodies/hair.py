@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float32, Float64
 
 from perpetua.actors.base.base_mesh import BODY_VERTEX_COUNT
+from perpetua.actors.base.images import tileable_noise, to_srgb
 from perpetua.actors.base.piece import Piece, Surface
 from perpetua.actors.base.rig import BONE_COUNT, base_weights, joint_index
 from perpetua.actors.base.surface import vertex_normals
@@ -11,7 +12,6 @@ from perpetua.actors.base.wearer import Wearer
 from perpetua.actors.bodies.hair_locks import CROWN_M, TIE_M, grow_spines, make_locks
 from perpetua.actors.bodies.hair_styles import HairStyle
 from perpetua.actors.bodies.scalp import scalp
-from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb
 from perpetua.actors.clothing.unwrap import unrolled
 from perpetua.scene.actor import ActorPart
 from perpetua.scene.room import Material

@@ -8,7 +8,7 @@ from jaxtyping import Float32, Float64, UInt8
 from scipy import ndimage
 
 from perpetua.actors.base.base_mesh import base_mesh
-from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb
+from perpetua.actors.base.images import tileable_noise, to_srgb
 
 SKIN_PX = 1024
 EYE_PX = 128

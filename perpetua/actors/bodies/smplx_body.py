@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt8
 
 from perpetua.actors.base.hands import relaxed_fingers
+from perpetua.actors.base.images import tileable_noise, to_srgb
 from perpetua.actors.bodies.bedlam import BedlamTextures, find_textures
 from perpetua.actors.bodies.hair import hair_image
 from perpetua.actors.bodies.people import draw_person
@@ -21,7 +22,7 @@ from perpetua.actors.bodies.smplx_model import (
     shaped_m,
 )
 from perpetua.actors.bodies.source import Body
-from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb, weave
+from perpetua.actors.clothing.fabrics import weave
 from perpetua.actors.clothing.garments import DYES
 from perpetua.actors.clothing.mhmat import load_image
 from perpetua.actors.config import ActorsConfig, SmplxConfig

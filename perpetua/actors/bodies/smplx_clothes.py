@@ -173,9 +173,8 @@ def _with_cut_faces(
     new = len(vertices_m) + place.reshape(2, -1)
     # Barycentric places of the five points of each cut face.
     corner = np.eye(3)[order]
-    from_a = np.where(edges[:, 0] < edges[:, 1], fraction[place.ravel()], 1.0 - fraction[place.ravel()]).reshape(
-        2, -1, 1
-    )
+    along = fraction[place.ravel()]
+    from_a = np.where(edges[:, 0] < edges[:, 1], along, 1.0 - along).reshape(2, -1, 1)
     on_ab, on_ac = (corner[:, 0] + from_a[i] * (corner[:, i + 1] - corner[:, 0]) for i in range(2))
     tip = np.stack([a, new[0], new[1]], axis=1)
     rest = (np.stack([new[0], b, c], axis=1), np.stack([new[0], c, new[1]], axis=1))

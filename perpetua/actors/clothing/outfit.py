@@ -98,47 +98,72 @@ def _draw_shoes(kind: str, rng: np.random.Generator) -> ShoePattern:
     )
 
 
+@dataclass(frozen=True)
+class _Suit:
+    """What is worn on trunk and legs; ``top_words`` and ``leg_words`` describe it."""
+
+    top: TopPattern
+    top_cloth: Cloth
+    bottom: TrouserPattern | SkirtPattern
+    bottom_cloth: Cloth
+    top_words: str
+    leg_words: str = ""
+
+
+def _draw_dress(dye: str, other: str, rng: np.random.Generator) -> _Suit:
+    cloth = Cloth(_pick(garments.DRESS_FABRICS, rng), dye, other)
+    bodice = garments.BODICES[int(rng.integers(len(garments.BODICES)))]
+    return _Suit(bodice, cloth, garments.DRESS_SKIRT, cloth, f"a {dye} {cloth.fabric} dress")
+
+
+def _draw_top_and_bottom(top: str, dye: str, other: str, female: bool, rng: np.random.Generator) -> _Suit:
+    cloth = Cloth(_pick(garments.TOP_FABRICS[top], rng), dye, other)
+    legs = _pick(garments.WOMEN_WEAR if female else garments.MEN_WEAR, rng)
+    colour = "navy" if legs == "jeans" else _pick(garments.LEG_DYES, rng)
+    leg_cloth = Cloth(_pick(garments.BOTTOM_FABRICS[legs], rng), colour, "white")
+    leg_words = f", a {colour} skirt" if legs == "skirt" else f", {colour} {legs}"
+    return _Suit(
+        garments.TOPS[top], cloth, garments.BOTTOMS[legs], leg_cloth, f"a {dye} {cloth.fabric} {top}", leg_words
+    )
+
+
 def draw_outfit(actor: int, female: bool, seed: StageSeed) -> Outfit:
     """Clothes of one actor; kinds of top and their colours take turns within a room."""
     room, rng = seed.stream("outfits"), seed.stream("outfit", actor)
-    tops = tuple(garments.TOPS)
-    top = tops[int(room.permutation(len(tops))[actor % len(tops)])]
-    dye = garments.TOP_DYES[int(room.permutation(len(garments.TOP_DYES))[actor % len(garments.TOP_DYES)])]
+    top = _in_turn(tuple(garments.TOPS), actor, room)
+    dye = _in_turn(garments.TOP_DYES, actor, room)
     other = _pick(tuple(name for name in garments.TOP_DYES if name != dye), rng)
     shoes = _pick(garments.SHOES, rng)
     jacket = _pick(tuple(garments.JACKETS), rng)
     jacket_cloth = Cloth(_pick(garments.JACKET_FABRICS[jacket], rng), _pick(garments.JACKET_DYES, rng), "beige")
-    lower: TrouserPattern | SkirtPattern
     wears_jacket = top in garments.UNDER_JACKETS and rng.random() < _JACKET_FRACTION
     over = f" under a {jacket_cloth.base} {jacket_cloth.fabric} {jacket}" if wears_jacket else ""
-    if female and rng.random() < _DRESS_FRACTION:
-        cloth = Cloth(_pick(garments.DRESS_FABRICS, rng), dye, other)
-        bodice = garments.BODICES[int(rng.integers(len(garments.BODICES)))]
-        upper, lower, lower_cloth = bodice, garments.DRESS_SKIRT, cloth
-        words = f"a {dye} {cloth.fabric} dress{over}"
-    else:
-        cloth = Cloth(_pick(garments.TOP_FABRICS[top], rng), dye, other)
-        legs = _pick(garments.WOMEN_WEAR if female else garments.MEN_WEAR, rng)
-        colour = "navy" if legs == "jeans" else _pick(garments.LEG_DYES, rng)
-        lower_cloth = Cloth(_pick(garments.BOTTOM_FABRICS[legs], rng), colour, "white")
-        upper, lower = garments.TOPS[top], garments.BOTTOMS[legs]
-        below = f"a {colour} skirt" if legs == "skirt" else f"{colour} {legs}"
-        words = f"a {dye} {cloth.fabric} {top}{over}, {below}"
-    bare = isinstance(lower, SkirtPattern)
-    sock_m = 0.0 if bare else _SHORT_SOCK_M if lower is garments.BOTTOMS["shorts"] else _LONG_SOCK_M
+    dressed = female and rng.random() < _DRESS_FRACTION
+    suit = _draw_dress(dye, other, rng) if dressed else _draw_top_and_bottom(top, dye, other, female, rng)
     return Outfit(
-        upper,
-        cloth,
-        lower,
-        lower_cloth,
+        suit.top,
+        suit.top_cloth,
+        suit.bottom,
+        suit.bottom_cloth,
         garments.JACKETS[jacket] if wears_jacket else None,
         jacket_cloth,
         _draw_shoes(shoes, rng),
-        sock_m,
+        _sock_m(suit.bottom),
         Cloth("knit", _pick(garments.SOCK_DYES, rng), "grey"),
-        _in_plain_words(f"{words} and {shoes}"),
+        _in_plain_words(f"{suit.top_words}{over}{suit.leg_words} and {shoes}"),
         actor,
     )
+
+
+def _in_turn(options: tuple[str, ...], actor: int, room: np.random.Generator) -> str:
+    """One of some options, in an order drawn for the room: actors differ for as long as there are others."""
+    return options[int(room.permutation(len(options))[actor % len(options)])]
+
+
+def _sock_m(bottom: TrouserPattern | SkirtPattern) -> float:
+    if isinstance(bottom, SkirtPattern):
+        return 0.0
+    return _SHORT_SOCK_M if bottom is garments.BOTTOMS["shorts"] else _LONG_SOCK_M
 
 
 def _in_plain_words(words: str) -> str:

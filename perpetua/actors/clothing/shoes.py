@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float64, Int32
 
 from perpetua.actors.base.base_mesh import BODY_VERTEX_COUNT, base_mesh
+from perpetua.actors.base.images import tileable_noise, to_srgb
 from perpetua.actors.base.piece import Piece
 from perpetua.actors.base.rig import BONE_COUNT, base_weights, joint_index, rest_joints
 from perpetua.actors.base.wearer import Wearer
-from perpetua.actors.clothing.fabrics import tileable_noise, to_srgb
 from perpetua.scene.actor import ActorPart
 from perpetua.scene.room import Material
 

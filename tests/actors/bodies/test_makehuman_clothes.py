@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from perpetua.actors.base.base_mesh import base_mesh
 from perpetua.actors.base.rig import base_weights
 from perpetua.actors.bodies.assembly import draw_bodies
-from perpetua.actors.bodies.makehuman_clothes import bound_weights, fitted
+from perpetua.actors.bodies.makehuman_fit import bound_weights, fitted
 from perpetua.actors.bodies.source import Body
 from perpetua.actors.bodies.user_files import body_listing
 from perpetua.actors.clothing.mhclo import read_binding, read_mesh
