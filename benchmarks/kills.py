@@ -26,7 +26,7 @@ from rich.console import Console
 from perpetua.config import load_config
 from perpetua.formats.layout import LOG_FILE
 from perpetua.io.files import file_sha256, read_json, write_json
-from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout
+from perpetua.pipeline.layout import WORK_FOLDER, RunLayout
 from perpetua.pipeline.room_work import GenerateRequest
 from perpetua.pipeline.stages import STAGE_NAMES
 from perpetua.pipeline.status import clean_work_area
@@ -170,7 +170,7 @@ def _differences(options: argparse.Namespace, calm: Path, killed: Path, room: in
     config = load_config("tiny", options.config)
     found: list[dict[str, str]] = []
     for out in (calm, killed):
-        layout = OutputLayout(out, config.export, options.seed, room)
+        layout = RunLayout(out, config.export, options.seed).room(room)
         sheet = layout.contact_sheet
         found.append(output_hashes(layout.sequence_folder) | {"preview": file_sha256(sheet)})
     names = sorted(found[0].keys() | found[1].keys())

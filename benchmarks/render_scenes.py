@@ -20,10 +20,9 @@ from perpetua.io.files import read_json, write_json
 from perpetua.machine.blender import Event, run_script
 from perpetua.machine.memory import PeakMemory
 from perpetua.pipeline import codec
-from perpetua.pipeline.layout import OutputLayout, read_run
+from perpetua.pipeline.layout import read_run
 from perpetua.pipeline.runner import rejected_draws
 from perpetua.pipeline.stages import STAGES
-from perpetua.pipeline.store import StageFolder
 from perpetua.rendering.bake import bake_room
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.job import write_job
@@ -94,9 +93,9 @@ def load_scene(out: Path, folder: Path) -> Scene:
     """Reads the first room of ``perpetua generate --until cameras --out OUT`` and makes its ``as_made.blend``."""
     record = read_run(out)
     number = record.rooms[0]
-    layout = OutputLayout(out, record.config.export, record.seed, number)
+    layout = record.layout(out).room(number)
     values = {
-        stage.name: codec.load(StageFolder(layout.work_folder, stage.number, stage.name).final)
+        stage.name: codec.load(layout.stage(stage).final)
         for stage in STAGES
         if stage.name in {"room", "actors", "cameras"}
     }
@@ -106,7 +105,7 @@ def load_scene(out: Path, folder: Path) -> Scene:
         stage = STAGES[0]
         redraw = stage.redraw(rejected_draws(layout, record.config), record.config.redraw)
         seed = StageSeed(record.seed, number, stage.name, redraw)
-        report = read_json(StageFolder(layout.work_folder, stage.number, stage.name).final / REPORT_FILE)
+        report = read_json(layout.stage(stage).final / REPORT_FILE)
         _make_again(values["room"], report, record.config, seed, as_made)
     return Scene(out.name, values["room"], values["actors"], values["cameras"], record.config, as_made, folder)
 

@@ -36,8 +36,8 @@ from perpetua.rendering.job import EXPOSURE_FILE, PENDING_FILE, RENDER_SCRIPT, w
 from perpetua.rendering.render import render_views
 from perpetua.scene.actor import ActorMesh
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
 from perpetua.scene.room import Room
+from perpetua.scene.scene import RenderedView
 
 # A sequence's length, over which starting Blender and metering are spread.
 SEQUENCE_FRAMES = 240

@@ -23,8 +23,8 @@ import numpy as np
 from perpetua.pipeline.codec import load
 from perpetua.scene.actor import ActorMesh
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
 from perpetua.scene.room import Room
+from perpetua.scene.scene import RenderedView, Scene
 from perpetua.seeding import StageSeed
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.follow import TrackScene
@@ -82,7 +82,7 @@ def _images(
     frames = len(cameras[0].world_from_camera)
     if not (given.images / "done").exists():
         given.images.mkdir(parents=True, exist_ok=True)
-        _cast_images(given, SceneSight(SceneMeshes.of(room, actors)), cameras)
+        _cast_images(given, SceneSight(SceneMeshes.of(Scene(room, actors))), cameras)
         (given.images / "done").touch()
     views = []
     for camera in cameras:
@@ -114,7 +114,7 @@ def _measure(given: Given, count: int, seed: int) -> None:
     room, actors, cameras = given.scene()
     views = _images(given, room, actors, cameras)
     whole = Watch()
-    scene = TimedScene(room, actors, cameras, views, TracksConfig(count=count))
+    scene = TimedScene(Scene(room, actors, cameras, views=views), TracksConfig(count=count))
     print(f"{count} tracks, {scene.frames} frames, {len(views)} views\n  meshes made ready for rays      {whole}")
     tracks = make_tracks(scene, StageSeed(seed, 0, "tracks"))
     made = (tracks.points.position_m, tracks.views.visible, tracks.queries_xytv)

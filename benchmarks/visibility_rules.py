@@ -34,12 +34,12 @@ from visibility_ledger import COUNTED, Ledger, print_rules, print_sequences
 from visibility_sheet import Example, write_sheet
 
 from perpetua.audit.deep import Reach, SceneRays
-from perpetua.audit.deep_scene import DeepScene
 from perpetua.audit.files import SequenceFiles, load_files
 from perpetua.audit.geometry import camera_centre_m, project_to_pixels
 from perpetua.audit.verify import find_sequences
 from perpetua.errors import InputError
-from perpetua.pipeline.kept import load_deep_scene
+from perpetua.pipeline.work_area import load_scene
+from perpetua.scene.scene import Scene
 from perpetua.tracks.sight import HairFaces, hair_faces
 
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
@@ -88,7 +88,7 @@ class Subject:
     """A sequence, its meshes, and what its record says of its tracks."""
 
     files: SequenceFiles
-    scene: DeepScene
+    scene: Scene
     object_index: Int64[np.ndarray, " P"]
     face: Int64[np.ndarray, " P"]
     moving: Bool[np.ndarray, " P"]
@@ -105,7 +105,7 @@ class Subject:
         wrong = [check.detail for check in checks if not check.passed]
         if wrong or files.record is None or "surface_xyz.npy" not in files.arrays:
             raise InputError(f"'{folder}' must be a complete sequence with sequence.json: {'; '.join(wrong)}")
-        table, scene = files.record["tracks"], load_deep_scene(folder)
+        table, scene = files.record["tracks"], load_scene(folder).scene
         moving = np.array(table["class"]) != "static"
         numbers = [np.array(table[name], np.int64) for name in ("object_index", "face")]
         return cls(files, scene, numbers[0], numbers[1], moving, hair_faces(scene.actors))

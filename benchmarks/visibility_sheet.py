@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from perpetua.formats.reader import Sequence, read_sequence
-from perpetua.pipeline.kept import kept_object_index
+from perpetua.pipeline.work_area import load_object_index
 from perpetua.report.pictures.drawing import BACKGROUND, FAINT, INK, Canvas, depth_colours, text_font
 
 REACH_PX, ENLARGE = 8, 9
@@ -39,7 +39,7 @@ def write_sheet(rows: dict[str, list[Example]], png: Path) -> None:
     """Draws a row of examples for each kind; the ring is where the point projects to, pixels are as rendered."""
     folders = {example.folder for several in rows.values() for example in several}
     sequences = {folder: read_sequence(folder) for folder in folders}
-    objects = {folder: kept_object_index(folder) for folder in folders}
+    objects = {folder: load_object_index(folder) for folder in folders}
     side = (2 * REACH_PX + 1) * ENLARGE
     most = max((len(several) for several in rows.values()), default=0)
     row_px = side + CAPTION_PX + GAP_PX

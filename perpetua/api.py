@@ -59,7 +59,6 @@ def generate(
     from rich.console import Console
 
     from perpetua.config import load_config
-    from perpetua.pipeline.layout import OutputLayout
     from perpetua.pipeline.room_work import GenerateRequest
     from perpetua.runs.generate import check_request, exit_code, make_rooms
 
@@ -79,7 +78,7 @@ def generate(
     failures = make_rooms(request, last_stage, Console(quiet=quiet))
     if failures:
         raise GenerationError(failures, len(wanted), exit_code(request, failures))
-    return [OutputLayout(request.out, request.config.export, seed, room).sequence_folder for room in wanted]
+    return [request.layout.room(room).sequence_folder for room in wanted]
 
 
 def open_sequence(folder: str | Path) -> Sequence:

@@ -12,12 +12,12 @@ import trimesh
 from jaxtyping import Bool, Float64, Int64
 
 from perpetua.audit.config import AuditConfig
-from perpetua.audit.deep_scene import DeepScene
 from perpetua.audit.files import SequenceFiles
 from perpetua.audit.geometry import NEIGHBOUR_PIXELS, camera_centre_m, depth_of_planes, project_to_pixels
 from perpetua.audit.on_meshes import check_on_meshes
 from perpetua.audit.report import Check
 from perpetua.audit.tally import Tally, check_of
+from perpetua.scene.scene import Scene
 
 NOTHING = 0
 # Depth bends by more than this share of itself from pixel to pixel only at silhouettes and creases.
@@ -71,7 +71,7 @@ class _Part:
 class SceneRays:
     """Rays at a scene, frame by frame."""
 
-    def __init__(self, scene: DeepScene) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
         objs = [obj for obj in scene.room.objects if obj.opaque]
         self.room = _Part([(obj.object_index, obj.mesh.vertices_m, obj.mesh.faces) for obj in objs])
@@ -123,7 +123,7 @@ def _along(
 
 
 def verify_deep(
-    files: SequenceFiles, table: dict[str, np.ndarray], scene: DeepScene, bounds: AuditConfig, frames: int
+    files: SequenceFiles, table: dict[str, np.ndarray], scene: Scene, bounds: AuditConfig, frames: int
 ) -> list[Check]:
     """Casts rays for depth, object and visibility, and looks where the meshes have the tracks.
 

@@ -4,13 +4,13 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from perpetua.audit.config import AuditConfig
-from perpetua.audit.deep_scene import DeepScene
 from perpetua.audit.files import SequenceFiles
 from perpetua.audit.report import Check
+from perpetua.scene.scene import Scene
 
 
 def check_on_meshes(
-    files: SequenceFiles, table: dict[str, np.ndarray], scene: DeepScene, bounds: AuditConfig, frames: list[int]
+    files: SequenceFiles, table: dict[str, np.ndarray], scene: Scene, bounds: AuditConfig, frames: list[int]
 ) -> Check:
     """Each track is the recorded barycentric point of the recorded face of its object's mesh, at some frames; and so
     is the triangle in ``surface_xyz.npy``, where there is one."""
@@ -34,7 +34,7 @@ def check_on_meshes(
 
 
 def _corners(
-    scene: DeepScene, frame: int, object_index: Int64[np.ndarray, " P"], face: Int64[np.ndarray, " P"]
+    scene: Scene, frame: int, object_index: Int64[np.ndarray, " P"], face: Int64[np.ndarray, " P"]
 ) -> Float64[np.ndarray, "P 3 3"]:
     """Corners of faces of objects at a frame; NaN for objects and faces that do not exist."""
     meshes = {obj.object_index: (obj.mesh.vertices_m, obj.mesh.faces) for obj in scene.room.objects}

@@ -10,7 +10,6 @@ from perpetua.audit.array_checks import check_cameras, check_finite, check_hashe
 from perpetua.audit.config import AuditConfig
 from perpetua.audit.cross_checks import check_index_of_tracks, check_labels_of_tracks, check_views_agree
 from perpetua.audit.deep import verify_deep
-from perpetua.audit.deep_scene import DeepScene
 from perpetua.audit.files import PICTURE_FILES, RECORD_FILE, SEQUENCE_FILES, SequenceFiles, load_files
 from perpetua.audit.flow_checks import check_flow, check_scene_flow, check_view_flow
 from perpetua.audit.label_checks import check_normals, check_object_index
@@ -27,6 +26,7 @@ from perpetua.audit.track_checks import (
 )
 from perpetua.audit.visibility_checks import check_visibility
 from perpetua.errors import SequenceFormatError
+from perpetua.scene.scene import Scene
 
 CAMERA_FILES = ("intrinsics.npy", "extrinsics_w2c.npy", "visibility.npy")
 
@@ -54,7 +54,7 @@ def _hidden(path: Path, folder: Path) -> bool:
     return any(part.startswith(".") for part in path.relative_to(folder).parts)
 
 
-def verify_sequence(folder: Path, bounds: AuditConfig, scene: DeepScene | None = None, frames: int = 8) -> AuditReport:
+def verify_sequence(folder: Path, bounds: AuditConfig, scene: Scene | None = None, frames: int = 8) -> AuditReport:
     """Runs every check that the files of a sequence allow.
 
     Args:
@@ -73,7 +73,7 @@ def verify_sequence(folder: Path, bounds: AuditConfig, scene: DeepScene | None =
         return _verify(folder, bounds, scene, frames)
 
 
-def _verify(folder: Path, bounds: AuditConfig, scene: DeepScene | None, frames: int) -> AuditReport:
+def _verify(folder: Path, bounds: AuditConfig, scene: Scene | None, frames: int) -> AuditReport:
     files, checks = load_files(folder)
     images = check_images(files)
     checks += [check_finite(files, bounds), images, check_cameras(files, bounds)]

@@ -17,7 +17,6 @@ from perpetua.cameras.optimise import Problem, Solution, optimise_paths, spline_
 from perpetua.cameras.spec import ViewWish, draw_wishes, shown_points
 from perpetua.cameras.starts import StartScene, ViewStart, draw_starts
 from perpetua.errors import CameraError
-from perpetua.geometry.mesh import join
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.raycast import Caster
 from perpetua.geometry.transforms import look_at
@@ -130,7 +129,7 @@ def camera_scene(
     room: Room, actors: tuple[ActorMesh, ...], config: CamerasConfig, fps: float, width_px: int, height_px: int
 ) -> CameraScene:
     """Measures the room and its actors, once for all candidates."""
-    caster = Caster(join([obj.mesh for obj in room.objects]))
+    caster = room.surfaces.caster
     field = signed_distance_field(room, caster, config.voxel_m)
     meshes = tuple(MovingMesh(actor) for actor in actors)
     return CameraScene(room, actors, meshes, actor_bounds(actors), caster, field, fps, width_px, height_px)

@@ -22,12 +22,12 @@ def verify(folders: tuple[Path, ...], deep: bool, frames: int, as_json: bool) ->
     FOLDERS are sequence folders, or folders that hold some. Exit code 1 if a check fails.
     """
     from perpetua.audit.verify import find_sequences, verify_sequence
-    from perpetua.pipeline.kept import load_deep_scene
+    from perpetua.pipeline.work_area import load_scene
 
     bounds = Config().audit
     reports = []
     for folder in (folder for given in folders for folder in find_sequences(given)):
-        scene = load_deep_scene(folder) if deep else None
+        scene = load_scene(folder).scene if deep else None
         reports.append(verify_sequence(folder, bounds, scene, frames))
     if as_json:
         click.echo(json.dumps([report.to_json() for report in reports], indent=1))

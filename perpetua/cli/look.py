@@ -81,6 +81,7 @@ def preview(
 
 
 def _preview_sequence(sequence: Path, out: Path | None, only: tuple[str, ...], times: int) -> None:
+    from perpetua.pipeline.layout import PREVIEW_FOLDER
     from perpetua.runs.preview_sequence import write_previews
 
     if out is not None and out.suffix.lower() in (*PICTURE_SUFFIXES, ".mp4", ".webp"):
@@ -88,7 +89,7 @@ def _preview_sequence(sequence: Path, out: Path | None, only: tuple[str, ...], t
             f"preview writes files of its own names into a folder, and '{out}' names a file: give a folder, and "
             "--only sheet for the contact sheet alone"
         )
-    folder = out if out is not None else Path("previews") / sequence.resolve().name
+    folder = out if out is not None else Path(PREVIEW_FOLDER) / sequence.resolve().name
     write_previews(sequence, folder, only, times, click.echo)
 
 

@@ -9,12 +9,11 @@ from typing import Literal
 
 from perpetua.errors import PerpetuaError
 from perpetua.pipeline.events import Event, OnEvent, log_line
+from perpetua.pipeline.layout import ROOM_LOG
 from perpetua.pipeline.lease import LeaseHeldError, LeaseLostError
 from perpetua.pipeline.room_work import RoomWork
 
 logger = logging.getLogger("perpetua")
-
-ROOM_LOG = "log.jsonl"
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from perpetua.errors import InputError
-from perpetua.pipeline.layout import OutputLayout, RunRecord
+from perpetua.pipeline.layout import RoomLayout, RunRecord
 from perpetua.pipeline.runner import published_redraw, rejected_draws, stage_keys
 from perpetua.pipeline.stages import STAGES
-from perpetua.pipeline.store import StageFolder
 
 # The last stage that needs no renderer: what lies before it runs on CPUs.
 LAST_OF_GEOMETRY = "cameras"
@@ -64,7 +63,7 @@ class Plan:
 
 def make_plan(
     run: RunRecord,
-    layouts: Sequence[OutputLayout],
+    layouts: Sequence[RoomLayout],
     scheduled: Iterable[int],
     resources: Resources,
     room_memory_mb: float,
@@ -84,7 +83,7 @@ def make_plan(
         InputError: with the given rooms per task there would be more tasks than Slurm allows.
     """
     busy = set(scheduled)
-    needs = {layout.room: _need(run, layout) for layout in layouts if layout.room not in busy}
+    needs = {layout.number: _need(run, layout) for layout in layouts if layout.number not in busy}
     at_least = resources.geometry_workers(room_memory_mb)
     return Plan(
         finished=sum(need == "nothing" for need in needs.values()),
@@ -96,15 +95,15 @@ def make_plan(
     )
 
 
-def has_geometry(run: RunRecord, layout: OutputLayout) -> bool:
+def has_geometry(run: RunRecord, layout: RoomLayout) -> bool:
     """Whether a room is finished up to its cameras; files are not hashed, as the task that goes on does so."""
-    keys = stage_keys(run.config, run.seed, layout.room, rejected_draws(layout, run.config))
+    keys = stage_keys(run.config, run.seed, layout.number, rejected_draws(layout, run.config))
     stage = next(stage for stage in STAGES if stage.name == LAST_OF_GEOMETRY)
-    manifest = StageFolder(layout.work_folder, stage.number, stage.name).manifest()
+    manifest = layout.stage(stage).manifest()
     return manifest is not None and manifest.key == keys[stage.name]
 
 
-def _need(run: RunRecord, layout: OutputLayout) -> Need:
+def _need(run: RunRecord, layout: RoomLayout) -> Need:
     if published_redraw(layout, run.config) is not None:
         return "nothing"
     return "pictures" if has_geometry(run, layout) else "geometry"

@@ -13,7 +13,7 @@ from perpetua.errors import PerpetuaError
 from perpetua.io.files import read_json
 from perpetua.machine.system_libraries import require_libraries
 from perpetua.pipeline.events import Event
-from perpetua.pipeline.layout import OutputLayout, RunRecord
+from perpetua.pipeline.layout import RunRecord
 from perpetua.pipeline.progress import describe
 from perpetua.pipeline.room_work import GenerateRequest, note_failures, room_work
 from perpetua.pipeline.stages import STAGE_NAMES
@@ -89,7 +89,7 @@ class RoomsTask:
         run = RunRecord(self.request.seed, self.rooms, self.request.config)
         failed = {}
         for room in self.rooms:
-            layout = OutputLayout(self.request.out, self.request.config.export, self.request.seed, room)
+            layout = self.request.layout.room(room)
             failure = read_json(layout.failure_file)
             if failure.get("stage") in _GEOMETRY and not has_geometry(run, layout):
                 failed[room] = str(failure.get("reason"))

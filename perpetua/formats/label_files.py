@@ -10,7 +10,7 @@ from perpetua.formats import layout
 from perpetua.formats.frame_file import FrameFile
 from perpetua.labels.motion import PixelFlow, flow, normals, scene_flow_m
 from perpetua.labels.pixels import LabelledScene, PixelSurfaces
-from perpetua.scene.filmed import FilmedScene
+from perpetua.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class LabelReport:
     labelled: int = 0
 
 
-def write_labels(folder: Path, scene: FilmedScene, outputs: tuple[str, ...]) -> LabelReport:
+def write_labels(folder: Path, scene: Scene, outputs: tuple[str, ...]) -> LabelReport:
     """Writes the chosen outputs of all views beside a sequence's other files, frame by frame.
 
     Args:

@@ -13,7 +13,7 @@ from jaxtyping import Float, Float32, Float64
 
 from perpetua.geometry.transforms import invert_rigid, transform_points
 from perpetua.scene.actor import ActorMesh, BodyMotion
-from perpetua.scene.filmed import FilmedScene
+from perpetua.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class ObjectPoses:
     box_m: Float32[np.ndarray, "T K 2 3"]
 
 
-def object_poses(scene: FilmedScene) -> ObjectPoses:
+def object_poses(scene: Scene) -> ObjectPoses:
     """The pose and the box of every object at every frame."""
     count = len(scene.room.objects) + len(scene.actors)
     world_from_object = np.empty((scene.frames, count, 4, 4), np.float32)

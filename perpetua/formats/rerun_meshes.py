@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt8
 
-from perpetua.formats.source import ExportSource, KeptMeshes
+from perpetua.formats.source import ExportSource
 from perpetua.scene.actor import ActorMesh, ActorPart
+from perpetua.scene.scene import Scene
 
 # What stands between an eye outside and the room; the viewer starts without it.
 SHELL = frozenset({"ceiling", "wall"})
@@ -26,7 +27,7 @@ class StillMesh:
     colour: tuple[int, int, int]
 
 
-def still_meshes(source: ExportSource, meshes: KeptMeshes) -> Iterator[StillMesh]:
+def still_meshes(source: ExportSource, meshes: Scene) -> Iterator[StillMesh]:
     """The objects of a room; those of its shell below ``shell``, the others below ``room``."""
     colours = _seen_colours(source)
     for obj in meshes.room.objects:

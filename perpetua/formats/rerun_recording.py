@@ -28,9 +28,10 @@ from jaxtyping import Float64, Int64, UInt8
 from perpetua.errors import EnvironmentSetupError
 from perpetua.formats.rerun_layout import viewer_layout
 from perpetua.formats.rerun_meshes import entity_name, still_meshes, vertex_colours, vertex_normals
-from perpetua.formats.source import HALF_PIXEL_PX, ExportSource, KeptMeshes, image_size_px
+from perpetua.formats.source import HALF_PIXEL_PX, ExportSource, image_size_px
 from perpetua.geometry.transforms import invert_rigid
 from perpetua.machine.extras import missing_extra
+from perpetua.scene.scene import Scene
 
 TRAIL_FRAMES = 12
 MOVING_M = 0.05
@@ -134,7 +135,7 @@ class _Recording:
         if view.depth_m is not None:
             self.stream.log(f"world/view_{index}/depth", pinhole, static=True)
 
-    def log_still_meshes(self, meshes: KeptMeshes) -> None:
+    def log_still_meshes(self, meshes: Scene) -> None:
         """The room, and of the people what does not move: triangles and colours."""
         for still in still_meshes(self.source, meshes):
             mesh = self.rr.Mesh3D(
@@ -148,7 +149,7 @@ class _Recording:
             surface = self.rr.Mesh3D.from_fields(triangle_indices=actor.faces, vertex_colors=vertex_colours(actor))
             self.stream.log(self._person_path(actor.object_index), surface, static=True)
 
-    def log_people(self, meshes: KeptMeshes, frame: int) -> None:
+    def log_people(self, meshes: Scene, frame: int) -> None:
         """Where the vertices of the people are at a frame."""
         for actor in meshes.actors:
             vertices_m = np.asarray(actor.vertices_m[frame])

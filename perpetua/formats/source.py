@@ -14,20 +14,11 @@ from perpetua.errors import SequenceFormatError
 from perpetua.formats.reader import Sequence, SequenceView
 from perpetua.geometry.transforms import transform_points
 from perpetua.registry import Registry
-from perpetua.scene.actor import ActorMesh
-from perpetua.scene.room import Room
+from perpetua.scene.scene import Scene
 
 PERSON = "person"
 # Corner of the top-left pixel as origin, where ours is its centre: what other readers add to our pixels.
 HALF_PIXEL_PX = 0.5
-
-
-@dataclass(frozen=True)
-class KeptMeshes:
-    """The meshes that a sequence was made of."""
-
-    room: Room
-    actors: tuple[ActorMesh, ...]
 
 
 @dataclass(frozen=True)
@@ -37,7 +28,7 @@ class ExportSource:
     name: str
     sequence: Sequence
     object_index: tuple[UInt16[np.ndarray, "F H W"], ...] | None = None
-    meshes: KeptMeshes | None = None
+    meshes: Scene | None = None
 
     @cached_property
     def record(self) -> dict[str, Any]:

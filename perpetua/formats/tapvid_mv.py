@@ -15,7 +15,7 @@ from perpetua.formats.poses import object_poses
 from perpetua.geometry.transforms import invert_rigid
 from perpetua.io.files import file_sha256
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import FilmedScene, RenderedView
+from perpetua.scene.scene import RenderedView, Scene
 from perpetua.tracks.motion import MOVING_M, is_fast, travel_m
 from perpetua.tracks.surface import SceneMeshes, SurfacePoints, bind
 from perpetua.tracks.types import PointTracks, SequenceTracks
@@ -23,7 +23,7 @@ from perpetua.tracks.types import PointTracks, SequenceTracks
 
 def write_sequence(
     folder: Path,
-    scene: FilmedScene,
+    scene: Scene,
     tracks: SequenceTracks,
     record: dict[str, Any],
     outputs: tuple[str, ...] = (),
@@ -38,7 +38,7 @@ def write_sequence(
         outputs: labels of every pixel to write too, some of ``perpetua.formats.config.OUTPUTS``.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    _write_tracks(folder, tracks, SceneMeshes.of(scene.room, scene.actors))
+    _write_tracks(folder, tracks, SceneMeshes.of(scene))
     actor_indices = [actor.object_index for actor in scene.actors]
     for index, (camera, view) in enumerate(zip(scene.cameras, scene.views, strict=True)):
         view_folder = folder / str(index)

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float64, Int64
 
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.transforms import invert_rigid, transform_points
-from perpetua.scene.filmed import FilmedScene
+from perpetua.scene.scene import Scene
 from perpetua.tracks.pixel_hits import hit_pixels
 from perpetua.tracks.placed import as_exported
 from perpetua.tracks.sight import SceneSight
@@ -45,9 +45,9 @@ class PixelSurfaces:
 class LabelledScene:
     """A scene whose pixels can be asked for, frame by frame, so that neither views nor labels need memory."""
 
-    def __init__(self, scene: FilmedScene) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.sight = SceneSight(SceneMeshes.of(scene.room, scene.actors))
+        self.sight = SceneSight(SceneMeshes.of(scene))
         self.cameras = tuple(
             ExportedCamera(exported_intrinsics(camera), as_exported(invert_rigid(camera.world_from_camera)))
             for camera in scene.cameras

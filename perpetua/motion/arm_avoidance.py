@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from perpetua.geometry.mesh import TriMesh, join
 from perpetua.geometry.raycast import Caster
 from perpetua.motion.arms import Arm, hanging_arm, reaching_arm
 from perpetua.motion.kinematics import bone, joint_index, joint_positions
@@ -63,17 +62,13 @@ def clear_arms(motions: tuple[BodyMotion, ...], skeletons: tuple[Skeleton, ...],
         skeletons: their bones.
         room: what stands around them.
     """
-    scene = Caster(_obstacles(room))
+    scene = room.obstacles.caster
     cleared = list(motions)
     for index, skeleton in enumerate(skeletons):
         others = tuple(_tubes(other, skeletons[place]) for place, other in enumerate(cleared) if place != index)
         for side in ("left", "right"):
             cleared[index] = _clear_arm(cleared[index], skeleton, side, _Surroundings(scene, others))
     return tuple(cleared)
-
-
-def _obstacles(room: Room) -> TriMesh:
-    return join([obj.mesh for obj in room.objects if not obj.walkable])
 
 
 def _tubes(motion: BodyMotion, skeleton: Skeleton) -> _Tubes:

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64
 
-from perpetua.geometry.mesh import join
 from perpetua.geometry.raycast import Caster
 from perpetua.motion.kinematics import bone
 from perpetua.motion.seated_pose import BACK_FLESH_M, SeatedPose, ahead_of, settle
@@ -51,7 +50,7 @@ def plan_sittings(route: Route, skeleton: Skeleton, room: Room, fps: float) -> t
     wanted = [dwell for dwell in route.dwells if dwell.purpose == "sit"]
     if not wanted:
         return ()
-    caster = Caster(join([obj.mesh for obj in room.objects]))
+    caster = room.surfaces.caster
     planned = []
     for dwell in wanted:
         sitting = _plan(dwell, route, skeleton, caster, fps)

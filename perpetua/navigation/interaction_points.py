@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from perpetua.geometry.mesh import join
-from perpetua.geometry.raycast import Caster, RayHits
+from perpetua.geometry.raycast import RayHits
 from perpetua.navigation.floor import WalkableFloor
 from perpetua.navigation.types import Spot
 from perpetua.scene.room import Room, SceneObject
@@ -91,9 +90,8 @@ def find_spots(room: Room, floor: WalkableFloor) -> tuple[Spot, ...]:
     views = [view for obj in room.objects for view in _views(obj, floor, floor.points_m[coarse])]
     if not views:
         return ()
-    caster = Caster(join([obj.mesh for obj in room.objects]))
-    owner = np.repeat([obj.object_index for obj in room.objects], [len(t.mesh.faces) for t in room.objects])
-    corners_m = caster.mesh.vertices_m[caster.mesh.faces]
+    caster = room.surfaces.caster
+    owner, corners_m = room.surfaces.object_index, room.surfaces.corner_m
     spots: list[Spot] = []
     for view in views:
         eye_m = np.column_stack([view.place_m, np.full(len(view.place_m), EYE_M)])

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from scipy.ndimage import maximum_filter
 
-from perpetua.geometry.mesh import TriMesh, join
+from perpetua.geometry.mesh import TriMesh
 from perpetua.geometry.raycast import Caster
 from perpetua.navigation.seat_measure import measure_seat
 from perpetua.scene.actor import Seat
@@ -89,8 +89,7 @@ def find_seats(room: Room) -> tuple[Seat, ...]:
     sittable = [obj for obj in room.objects if obj.category in SEAT_CATEGORIES and len(obj.mesh.faces) > 0]
     if not sittable:
         return ()
-    caster = Caster(join([obj.mesh for obj in room.objects]))
-    owner_of_face = np.concatenate([np.full(len(obj.mesh.faces), obj.object_index, np.int64) for obj in room.objects])
+    caster, owner_of_face = room.surfaces.caster, room.surfaces.object_index
     floor_m = float(np.median([_floor_m(obj.mesh) for obj in room.objects if obj.walkable] or [0.0]))
     seats: list[Seat] = []
     for obj in sittable:

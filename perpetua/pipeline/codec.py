@@ -20,8 +20,8 @@ from perpetua.io.files import load_json
 from perpetua.navigation.types import NavGrid
 from perpetua.scene.actor import ActorMesh, ActorPart, BodyMotion, Dwell, Route, Seat
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
 from perpetua.scene.room import AreaLight, Material, Room, SceneObject, Sky
+from perpetua.scene.scene import RenderedView
 from perpetua.tracks.types import PointTracks, SequenceTracks, SightReport, ViewTracks
 
 VALUE_FILE = "value.json"

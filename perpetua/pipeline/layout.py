@@ -7,12 +7,16 @@ from pathlib import Path
 from perpetua.config import Config
 from perpetua.errors import InputError
 from perpetua.formats.config import ExportConfig, split_of_room
-from perpetua.formats.layout import AUDIT
+from perpetua.formats.layout import AUDIT, LOG_FILE
 from perpetua.io.files import load_json, write_json
 from perpetua.pipeline.lease import hold_when_free
+from perpetua.pipeline.store import StageFolder, StageName, stage_folder
 
 WORK_FOLDER = ".work"
 RUN_FILE = "run.json"
+ROOM_LOG = LOG_FILE
+# Pictures of sequences that generate and preview draw, in the output folder and the current one.
+PREVIEW_FOLDER = "previews"
 
 
 def sequence_name(seed: int, room: int) -> str:
@@ -21,36 +25,75 @@ def sequence_name(seed: int, room: int) -> str:
 
 
 @dataclass(frozen=True)
-class OutputLayout:
-    """The folders of one room below the output folder."""
+class RunLayout:
+    """The folders of one run: the output folder, and what the names below it depend on."""
 
     out: Path
     export: ExportConfig
     seed: int
-    room: int
+
+    def room(self, room: int) -> "RoomLayout":
+        """The folders of one room."""
+        return RoomLayout(self, room)
+
+    @property
+    def work_area(self) -> Path:
+        """What is kept to go on from."""
+        return self.out / WORK_FOLDER
+
+    @property
+    def slurm_folder(self) -> Path:
+        """Files of the tasks that a cluster has."""
+        return self.work_area / "slurm"
+
+    @property
+    def log_file(self) -> Path:
+        """What happened, one JSON object per line."""
+        return self.out / LOG_FILE
+
+
+@dataclass(frozen=True)
+class RoomLayout:
+    """The folders and files of one room of a run."""
+
+    run: RunLayout
+    number: int
+
+    @property
+    def name(self) -> str:
+        """Of the room's sequence."""
+        return sequence_name(self.run.seed, self.number)
 
     @property
     def work_folder(self) -> Path:
         """Where the room's stages are kept."""
-        return self.out / WORK_FOLDER / sequence_name(self.seed, self.room)
+        return self.run.work_area / self.name
+
+    def stage(self, stage: StageName) -> StageFolder:
+        """Where one of them is kept."""
+        return stage_folder(self.work_folder, stage)
 
     @property
     def sequence_folder(self) -> Path:
         """Where the finished sequence appears."""
-        split = split_of_room(self.export, self.seed, self.room)
-        return self.out / split / sequence_name(self.seed, self.room)
+        return self.run.out / split_of_room(self.run.export, self.run.seed, self.number) / self.name
 
     @property
     def other_sequence_folders(self) -> list[Path]:
         """Folders of splits, other than the room's own, in which an earlier config published the room."""
         own = self.sequence_folder
-        found = (path for path in self.out.glob(f"*/{own.name}") if path.parent.name != WORK_FOLDER)
+        found = (path for path in self.run.out.glob(f"*/{self.name}") if path.parent.name != WORK_FOLDER)
         return sorted(path for path in found if path != own and (path / AUDIT).is_file())
 
     @property
     def contact_sheet(self) -> Path:
         """The picture of the finished sequence."""
-        return self.out / "previews" / f"{sequence_name(self.seed, self.room)}.png"
+        return self.run.out / PREVIEW_FOLDER / f"{self.name}.png"
+
+    @property
+    def log_file(self) -> Path:
+        """What happened to the room, one JSON object per line."""
+        return self.work_folder / ROOM_LOG
 
     @property
     def failure_file(self) -> Path:
@@ -70,6 +113,10 @@ class RunRecord:
     seed: int
     rooms: tuple[int, ...]
     config: Config
+
+    def layout(self, out: Path) -> RunLayout:
+        """Its folders, in the output folder ``out``."""
+        return RunLayout(out, self.config.export, self.seed)
 
 
 def read_run(out: Path) -> RunRecord:

@@ -10,8 +10,9 @@ from perpetua.config import Config
 from perpetua.geometry.mesh import TriMesh
 from perpetua.machine.version import __version__
 from perpetua.pipeline.store import library_versions
-from perpetua.scene.actor import ActorMesh, Dwell, Route
-from perpetua.scene.room import Room, SceneObject
+from perpetua.scene.actor import Dwell, Route
+from perpetua.scene.room import SceneObject
+from perpetua.scene.scene import Scene
 from perpetua.seeding import StageSeed
 
 LICENCES = {
@@ -21,11 +22,9 @@ LICENCES = {
 }
 
 
-def sequence_record(
-    config: Config, seed: StageSeed, room: Room, routes: tuple[Route, ...], actors: tuple[ActorMesh, ...]
-) -> dict[str, Any]:
+def sequence_record(config: Config, seed: StageSeed, scene: Scene, routes: tuple[Route, ...]) -> dict[str, Any]:
     """Seed, config, object table with footprints, routes, versions and licences, as JSON values."""
-    table = [_object_entry(obj) for obj in room.objects]
+    table = [_object_entry(obj) for obj in scene.room.objects]
     table += [
         {
             "object_index": actor.object_index,
@@ -38,16 +37,16 @@ def sequence_record(
             "route_m": np.round(route.position_m, 4).tolist(),
             "heading_rad": np.round(route.heading_rad, 4).tolist(),
         }
-        for route, actor in zip(routes, actors, strict=True)
+        for route, actor in zip(routes, scene.actors, strict=True)
     ]
     return {
         "perpetua": __version__,
         "seed": seed.seed,
         "room": seed.room,
-        "room_name": room.name,
-        "room_kind": room.kind,
-        "room_height_m": room.height_m,
-        "floor_polygon_m": room.floor_polygon_m.tolist(),
+        "room_name": scene.room.name,
+        "room_kind": scene.room.kind,
+        "room_height_m": scene.room.height_m,
+        "floor_polygon_m": scene.room.floor_polygon_m.tolist(),
         "fps": config.sequence.fps,
         "config": config.content(),
         "objects": table,

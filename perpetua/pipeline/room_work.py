@@ -12,12 +12,11 @@ from perpetua.formats.reader import read_sequence
 from perpetua.io.files import write_json
 from perpetua.pipeline.cost import estimate_cost, require_room_space
 from perpetua.pipeline.events import OnEvent
-from perpetua.pipeline.layout import OutputLayout
+from perpetua.pipeline.layout import RoomLayout, RunLayout
 from perpetua.pipeline.lease import hold
 from perpetua.pipeline.os_errors import explained
 from perpetua.pipeline.runner import RoomRun
 from perpetua.pipeline.stages import STAGES
-from perpetua.pipeline.store import StageFolder
 from perpetua.report.pictures.contact_sheet import write_contact_sheet
 
 RoomJob = Callable[[int, OnEvent], None]
@@ -50,13 +49,18 @@ class GenerateRequest:
     device: str
     replace: bool
 
+    @property
+    def layout(self) -> RunLayout:
+        """The folders of the run."""
+        return RunLayout(self.out, self.config.export, self.seed)
+
 
 def make_room(request: GenerateRequest, until: str, room: int, on_event: OnEvent) -> None:
     """One room through the stages, and its contact sheet."""
-    if not OutputLayout(request.out, request.config.export, request.seed, room).sequence_folder.exists():
+    if not request.layout.room(room).sequence_folder.exists():
         require_room_space(estimate_cost(request.config, 1), request.out)
     RoomRun(request.config, request.seed, room, request.out, request.device, on_event).run(until)
-    layout = OutputLayout(request.out, request.config.export, request.seed, room)
+    layout = request.layout.room(room)
     if until == STAGES[-1].name and not layout.contact_sheet.exists():
         with hold(layout.work_folder):
             if not layout.contact_sheet.exists():
@@ -73,7 +77,7 @@ def room_work(request: GenerateRequest, until: str) -> RoomWork:
 def note_failures(request: GenerateRequest, failures: dict[int, str]) -> None:
     """Leaves a note of failures that the room's own process could not note: it was killed, or met a fault of ours."""
     for room, reason in failures.items():
-        layout = OutputLayout(request.out, request.config.export, request.seed, room)
+        layout = request.layout.room(room)
         if not layout.failure_file.exists():
             failure = {"stage": _first_missing(layout), "reason": reason, "exit_code": PerpetuaError.exit_code}
             # A full disk has no place for a note; the reason is said all the same.
@@ -81,17 +85,17 @@ def note_failures(request: GenerateRequest, failures: dict[int, str]) -> None:
                 write_json(layout.failure_file, failure)
 
 
-def _first_missing(layout: OutputLayout) -> str:
-    folders = {stage.name: StageFolder(layout.work_folder, stage.number, stage.name) for stage in STAGES}
+def _first_missing(layout: RoomLayout) -> str:
+    folders = {stage.name: layout.stage(stage) for stage in STAGES}
     return next((name for name, folder in folders.items() if folder.manifest() is None), STAGES[-1].name)
 
 
 def room_folder(request: GenerateRequest, room: int) -> Path:
     """Where a room's work is done."""
-    return OutputLayout(request.out, request.config.export, request.seed, room).work_folder
+    return request.layout.room(room).work_folder
 
 
-def _draw_contact_sheet(layout: OutputLayout) -> None:
+def _draw_contact_sheet(layout: RoomLayout) -> None:
     partial_sheet = layout.contact_sheet.with_name(f".{layout.contact_sheet.name}")
     layout.contact_sheet.parent.mkdir(parents=True, exist_ok=True)
     write_contact_sheet(read_sequence(layout.sequence_folder), partial_sheet)

@@ -17,10 +17,10 @@ from perpetua.machine.memory import PeakMemory, give_back
 from perpetua.machine.scripts import scripts_sha256
 from perpetua.pipeline import codec, store
 from perpetua.pipeline.events import Event, OnEvent
-from perpetua.pipeline.layout import OutputLayout
+from perpetua.pipeline.layout import RoomLayout, RunLayout
 from perpetua.pipeline.lease import Lease, hold
 from perpetua.pipeline.os_errors import explained
-from perpetua.pipeline.stages import SEQUENCE_FOLDER, STAGES, Stage, StageContext
+from perpetua.pipeline.stages import SEQUENCE_FOLDER, STAGES, Stage, StageContext, UndeclaredInputError
 from perpetua.pipeline.work_area import free_work
 from perpetua.seeding import StageSeed
 
@@ -42,30 +42,37 @@ class RoomRun:
     rejected: int = 0
     keys: dict[str, str] = field(default_factory=dict)
     values: dict[str, Any] = field(default_factory=dict)
+    shared: dict[str, Any] = field(default_factory=dict)
     lease: Lease = field(init=False)
 
     def __post_init__(self) -> None:
-        self.layout = OutputLayout(self.out, self.config.export, self.seed, self.room)
+        self.layout = RunLayout(self.out, self.config.export, self.seed).room(self.room)
 
-    def run(self, until: str) -> None:
+    def run(self, until: str, even_if_published: bool = False) -> None:
         """Runs the stages up to and with ``until``; the last one publishes the sequence.
+
+        Args:
+            until: name of a stage.
+            even_if_published: run them, as far as their results are not there, also for a room whose sequence is
+                published and needs none.
 
         Raises:
             PerpetuaError: a stage failed; what is finished stays.
             LeaseHeldError: another run is at the room.
         """
         self._report("room_started")
-        if not self._is_published():
+        if even_if_published or not self._is_published():
             first = self.stages[0].name
             with explained(first, self.layout.work_folder), hold(self.layout.work_folder) as self.lease:
                 # Another run may have made it since.
-                if not self._is_published():
+                if even_if_published or not self._is_published():
                     self.layout.failure_file.unlink(missing_ok=True)
                     self._run_draws(until)
         self.layout.failure_file.unlink(missing_ok=True)
         if until == self.stages[-1].name:
             free_work(self.layout.work_folder, self.config.work.keep, self.stages)
         self.values.clear()
+        self.shared.clear()
         give_back()
         self._report("room_finished")
 
@@ -75,7 +82,10 @@ class RoomRun:
     def _run_draws(self, until: str) -> None:
         """Draws that an earlier run found wanting are not tried again, so the outcome has no history."""
         while True:
-            self.rejected = rejected_draws(self.layout, self.config, self.stages)
+            # Of a published room the record of rejected draws may be gone with the work area; their number is not.
+            published = published_redraw(self.layout, self.config, self.stages)
+            rejected = rejected_draws(self.layout, self.config, self.stages)
+            self.rejected = rejected if published is None else published
             self.keys = stage_keys(self.config, self.seed, self.room, self.rejected, self.stages)
             self.values.clear()
             failed = self._run_stages(until)
@@ -117,7 +127,7 @@ class RoomRun:
             write_json(self.layout.failure_file, failure)
 
     def _run_stage(self, stage: Stage) -> None:
-        folder = store.StageFolder(self.layout.work_folder, stage.number, stage.name)
+        folder = self.layout.stage(stage)
         key = self.keys[stage.name]
         if folder.is_complete(key, stage.leftovers):
             self._report("stage_skipped", stage.name)
@@ -167,19 +177,28 @@ class RoomRun:
             self.lease.require_held()
             self._report("frame_rendered", stage.name, seconds=seconds, frames_done=done, frames_total=total)
 
+        def declared(name: str) -> str:
+            if name not in stage.needs:
+                raise UndeclaredInputError(
+                    f"stage '{stage.name}' reads '{name}', which its row in the stage table does not declare: add it "
+                    f"to its needs, which are {stage.needs}"
+                )
+            return name
+
         return StageContext(
             config=self.config,
             seed=StageSeed(self.seed, self.room, stage.name, stage.redraw(self.rejected, self.config.redraw)),
             folder=partial,
             device=self.device,
-            stage_folders={name: self._folder_of(name) for name in stage.needs},
-            upstream=self._upstream,
+            folder_of=lambda name: self._folder_of(declared(name)),
+            upstream=lambda name: self._upstream(declared(name)),
+            shared=self.shared,
             on_frame=on_frame,
         )
 
     def _folder_of(self, name: str) -> Path:
         stage = next(stage for stage in self.stages if stage.name == name)
-        return store.StageFolder(self.layout.work_folder, stage.number, stage.name).final
+        return self.layout.stage(stage).final
 
     def _upstream(self, name: str) -> Any:
         if name not in self.values:
@@ -236,24 +255,24 @@ def _scripts_once(entries: tuple[Path, ...]) -> str:
     return scripts_sha256(entries)
 
 
-def rejected_draws(layout: OutputLayout, config: Config, stages: tuple[Stage, ...] = STAGES) -> int:
+def rejected_draws(layout: RoomLayout, config: Config, stages: tuple[Stage, ...] = STAGES) -> int:
     """How many draws of a room are known to break a hard limit under this config."""
     rejections = read_json(layout.rejections_file)
     rejected = 0
     limit = (config.redraw.routes_per_room + 1) * (config.redraw.rooms + 1)
     while rejected + 1 < limit:
-        keys = stage_keys(config, layout.seed, layout.room, rejected, stages)
+        keys = stage_keys(config, layout.run.seed, layout.number, rejected, stages)
         if not any(key in rejections for key in keys.values()):
             break
         rejected += 1
     return rejected
 
 
-def published_redraw(layout: OutputLayout, config: Config, stages: tuple[Stage, ...] = STAGES) -> int | None:
+def published_redraw(layout: RoomLayout, config: Config, stages: tuple[Stage, ...] = STAGES) -> int | None:
     """How many draws were rejected before the published sequence; None if none is published under this config."""
     audit = read_json(layout.sequence_folder / AUDIT_FILE)
     rejected = audit.get("rejected_draws")
     if not isinstance(rejected, int):
         return None
-    keys = stage_keys(config, layout.seed, layout.room, rejected, stages)
+    keys = stage_keys(config, layout.run.seed, layout.number, rejected, stages)
     return rejected if audit.get("key") == keys[stages[-1].name] else None

@@ -1,8 +1,10 @@
-"""The stage table: what runs, in which order, from which settings. Reading it top to bottom is the pipeline."""
+"""The stage table: what runs, in which order, from which settings. Reading it top to bottom is the pipeline.
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from functools import lru_cache
+The contact sheet is no stage: ``pipeline.room_work`` draws it of the published sequence, on which nothing depends.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -10,7 +12,6 @@ from perpetua.actors.bodies.assembly import assemble_actors, draw_bodies, measur
 from perpetua.actors.bodies.source import BODY_MODELS, Body
 from perpetua.actors.bodies.user_files import body_listing
 from perpetua.actors.checks.validation import validate_actors
-from perpetua.actors.config import ActorsConfig
 from perpetua.audit.motion_audit import MotionLimits, audit_motion
 from perpetua.audit.verify import verify_sequence
 from perpetua.cameras.plan import CameraPlan, plan_cameras
@@ -39,8 +40,8 @@ from perpetua.routes.casting import action_descriptions
 from perpetua.routes.plan import plan_routes
 from perpetua.scene.actor import ActorMesh, BodyMotion, Route
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import FilmedScene, RenderedView
 from perpetua.scene.room import Room
+from perpetua.scene.scene import RenderedView, Scene
 from perpetua.seeding import StageSeed
 from perpetua.tracks.follow import TrackScene
 from perpetua.tracks.make import make_tracks
@@ -66,16 +67,18 @@ RENDER_JOB_FOLDER = "job"
 class StageContext:
     """What a stage's function may use.
 
-    ``folder`` takes the stage's files; ``upstream`` loads an earlier stage's value; ``on_frame`` reports rendered
-    frames (done, total, seconds of the last one).
+    ``folder`` takes the stage's files; ``upstream`` loads an earlier stage's value and ``folder_of`` is where its files
+    lie, for stages that the row declares in ``needs``; ``shared`` holds what several stages of the room make from the
+    same settings; ``on_frame`` reports rendered frames (done, total, seconds of the last one).
     """
 
     config: Config
     seed: StageSeed
     folder: Path
     device: str
-    stage_folders: Mapping[str, Path]
+    folder_of: Callable[[str], Path]
     upstream: Callable[[str], Any]
+    shared: dict[str, Any]
     on_frame: Callable[[int, int, float], None]
 
     def one(self, stage: str, kind: type[Value]) -> Value:
@@ -91,6 +94,10 @@ class StageContext:
         if not all(isinstance(value, kind) for value in values):
             raise TypeError(f"stage {stage} gave something other than {kind.__name__}")
         return values
+
+
+class UndeclaredInputError(Exception):
+    """A stage reads what its row does not declare, so that its key would not change with it: a fault of the table."""
 
 
 def _never(rejected: int, config: RedrawConfig) -> int:
@@ -172,13 +179,12 @@ def _routes(context: StageContext) -> tuple[Route, ...]:
 
 
 def _bodies(context: StageContext) -> tuple[Body, ...]:
-    return _draw_bodies_once(context.config.actors.model_dump_json(), context.seed.seed, context.seed.room)
-
-
-@lru_cache(maxsize=1)
-def _draw_bodies_once(actors_json: str, seed: int, room: int) -> tuple[Body, ...]:
     """Motion and actors need the same bodies: both draw from one stream of its own, and one of them pays."""
-    return draw_bodies(ActorsConfig.model_validate_json(actors_json), StageSeed(seed, room, "bodies"))
+    if "bodies" not in context.shared:
+        seed = StageSeed(context.seed.seed, context.seed.room, "bodies")
+        context.shared["bodies"] = draw_bodies(context.config.actors, seed)
+    bodies: tuple[Body, ...] = context.shared["bodies"]
+    return bodies
 
 
 def _route_settings(config: Config) -> dict[str, Any]:
@@ -279,41 +285,38 @@ def _render(context: StageContext) -> tuple[RenderedView, ...]:
     )
 
 
-def _tracks(context: StageContext) -> SequenceTracks:
-    scene = TrackScene(
+def _scene(context: StageContext) -> Scene:
+    """What was rendered, and the views."""
+    return Scene(
         context.one("room", Room),
         context.many("actors", ActorMesh),
         context.many("cameras", CameraPath),
-        context.many("render", RenderedView),
-        context.config.tracks,
+        views=context.many("render", RenderedView),
     )
-    tracks = make_tracks(scene, context.seed)
+
+
+def _tracks(context: StageContext) -> SequenceTracks:
+    tracks = make_tracks(TrackScene(_scene(context), context.config.tracks), context.seed)
     write_json(context.folder / SIGHT_FIGURES, asdict(tracks.report))
     return tracks
 
 
 def _export(context: StageContext) -> None:
-    scene = FilmedScene(
-        context.one("room", Room),
-        context.many("motion", BodyMotion),
-        context.many("actors", ActorMesh),
-        context.many("cameras", CameraPath),
-        context.many("render", RenderedView),
-    )
+    scene = replace(_scene(context), motions=context.many("motion", BodyMotion))
     config = context.config
-    record = sequence_record(config, context.seed, scene.room, context.many("routes", Route), scene.actors)
+    record = sequence_record(config, context.seed, scene, context.many("routes", Route))
     tracks = context.one("tracks", SequenceTracks)
     write_sequence(context.folder / SEQUENCE_FOLDER, scene, tracks, record, config.export.outputs)
 
 
 def _audit(context: StageContext) -> None:
-    report = verify_sequence(context.stage_folders["export"] / SEQUENCE_FOLDER, context.config.audit)
+    report = verify_sequence(context.folder_of("export") / SEQUENCE_FOLDER, context.config.audit)
     figures = {
         "sequence": report.to_json(),
-        "actors": read_json(context.stage_folders["actors"] / ACTOR_FIGURES),
-        "cameras": read_json(context.stage_folders["cameras"] / CAMERA_FIGURES),
-        "motion": read_json(context.stage_folders["cameras"] / MOTION_FIGURES),
-        "visibility": read_json(context.stage_folders["tracks"] / SIGHT_FIGURES),
+        "actors": read_json(context.folder_of("actors") / ACTOR_FIGURES),
+        "cameras": read_json(context.folder_of("cameras") / CAMERA_FIGURES),
+        "motion": read_json(context.folder_of("cameras") / MOTION_FIGURES),
+        "visibility": read_json(context.folder_of("tracks") / SIGHT_FIGURES),
     }
     write_json(context.folder / layout.AUDIT, figures)
     if not report.passed:

@@ -9,11 +9,10 @@ from typing import Any
 from rich.table import Table
 
 from perpetua.io.files import read_json
-from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout, RunRecord, read_run
+from perpetua.pipeline.layout import RunRecord, read_run
 from perpetua.pipeline.lease import LeaseWatch, read_lease
 from perpetua.pipeline.runner import published_redraw, rejected_draws, stage_keys
 from perpetua.pipeline.stages import STAGES
-from perpetua.pipeline.store import StageFolder
 
 # Of more rooms than this, those that are finished are not listed.
 _MOST_LISTED = 50
@@ -103,13 +102,13 @@ def read_status(out: Path) -> StatusReport:
 
 
 def _room_status(out: Path, run: RunRecord, room: int) -> RoomStatus:
-    layout = OutputLayout(out, run.config.export, run.seed, room)
+    layout = run.layout(out).room(room)
     published = published_redraw(layout, run.config)
     rejected = rejected_draws(layout, run.config) if published is None else published
     keys = stage_keys(run.config, run.seed, room, rejected)
     seconds: dict[str, float] = {}
     for stage in STAGES:
-        manifest = StageFolder(layout.work_folder, stage.number, stage.name).manifest()
+        manifest = layout.stage(stage).manifest()
         if manifest is not None and manifest.key == keys[stage.name]:
             seconds[stage.name] = manifest.seconds
     failure = read_json(layout.failure_file)
@@ -157,15 +156,15 @@ def clean_work_area(out: Path, unfinished: bool) -> float:
     report = read_status(out)
     freed = 0.0
     for room in report.rooms:
-        layout = OutputLayout(out, run.config.export, run.seed, room.room)
+        layout = run.layout(out).room(room.room)
         if (room.finished or unfinished) and LeaseWatch(layout.work_folder).is_free():
             freed += _remove(layout.work_folder)
             for left in layout.sequence_folder.parent.glob(f".{layout.sequence_folder.name}.*"):
                 freed += _remove(left)
-    work_area = out / WORK_FOLDER
+    work_area = run.layout(out).work_area
     # What is left when no room is at work or to be made: the files of Slurm's tasks, and the leases of their folders.
     if unfinished or all(room.finished for room in report.rooms):
-        in_use = [OutputLayout(out, run.config.export, run.seed, room.room).work_folder for room in report.rooms]
+        in_use = [run.layout(out).room(room.room).work_folder for room in report.rooms]
         if not any(folder.exists() for folder in in_use):
             freed += _remove(work_area)
     return freed

@@ -12,6 +12,7 @@ import shutil
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
+from typing import Protocol, runtime_checkable
 
 from perpetua.io.files import file_sha256, load_json
 
@@ -65,6 +66,19 @@ def library_versions() -> dict[str, str]:
     return versions
 
 
+@runtime_checkable
+class StageName(Protocol):
+    """What the folder of a stage is named by."""
+
+    @property
+    def number(self) -> int:
+        """Its place in the pipeline."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+
 class StageFolder:
     """One stage of one room on disk."""
 
@@ -108,6 +122,11 @@ class StageFolder:
         path = self.partial / MANIFEST_FILE
         path.write_text(json.dumps(asdict(manifest), indent=1, sort_keys=True) + "\n", encoding="utf-8")
         replace_folder(self.partial, self.final)
+
+
+def stage_folder(room_folder: Path, stage: StageName) -> StageFolder:
+    """Where a room keeps a stage."""
+    return StageFolder(room_folder, stage.number, stage.name)
 
 
 def replace_folder(source: Path, target: Path) -> None:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt16
 
-from perpetua.geometry.mesh import join
 from perpetua.geometry.pinhole import Intrinsics, unproject
 from perpetua.geometry.raycast import Caster
 from perpetua.scene.camera import CameraPath
@@ -32,16 +31,13 @@ def measure_closeness(room: Room, cameras: tuple[CameraPath, ...]) -> Closeness:
 
     Pixels per metre are those of a surface that faces the camera: the side along which a slanted one is seen in full.
     """
-    objs = [obj for obj in room.objects if len(obj.mesh.faces)]
-    if not objs:
+    surfaces = room.surfaces
+    if not len(surfaces.object_index):
         return Closeness(np.zeros(0, np.uint16), np.zeros(0, np.int32), np.zeros(0, np.float32))
-    caster = Caster(join([obj.mesh for obj in objs]))
-    start = np.cumsum([0] + [len(obj.mesh.faces) for obj in objs])
+    caster = surfaces.caster
     faces, densities = zip(*(_look(caster, camera) for camera in cameras), strict=True)
     face, density = np.concatenate(faces), np.concatenate(densities)
-    number = np.searchsorted(start, face, side="right") - 1
-    index = np.array([obj.object_index for obj in objs], np.uint16)
-    return Closeness(index[number], (face - start[number]).astype(np.int32), density.astype(np.float32))
+    return Closeness(surfaces.object_index[face].astype(np.uint16), surfaces.face[face], density.astype(np.float32))
 
 
 def _look(caster: Caster, camera: CameraPath) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]]:

@@ -12,7 +12,7 @@ from jaxtyping import Float32, UInt16
 
 from perpetua.errors import RenderError
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
+from perpetua.scene.scene import RenderedView
 
 # Depth at and beyond this is no surface (Blender writes 1e10 for the background).
 BACKGROUND_DEPTH_M = 1e9

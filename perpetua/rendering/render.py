@@ -16,8 +16,8 @@ from perpetua.rendering.frames import DamagedFrameError, assemble_view, drop_dam
 from perpetua.rendering.job import FRAME_FOLDER, NO_SEED, PENDING_FILE, RENDER_SCRIPT, write_job
 from perpetua.scene.actor import ActorMesh
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
 from perpetua.scene.room import Room
+from perpetua.scene.scene import RenderedView
 from perpetua.seeding import StageSeed
 
 logger = logging.getLogger(__name__)

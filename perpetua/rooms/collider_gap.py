@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from perpetua.geometry.mesh import TriMesh, face_areas_m2, join
+from perpetua.geometry.mesh import TriMesh, face_areas_m2
 from perpetua.geometry.raycast import Caster
 from perpetua.navigation.raster import inside_polygon
 from perpetua.scene.room import Room
@@ -34,7 +34,7 @@ class ColliderGap:
 
 def collider_gap(room: Room, colliders: TriMesh) -> ColliderGap:
     """Compares the rendered surface of a room with its collision meshes."""
-    points_m = _spread(join([obj.mesh for obj in room.objects]), SAMPLES)
+    points_m = _spread(room.surfaces.mesh, SAMPLES)
     distance_m = Caster(colliders).closest_distance(points_m[_inside(points_m, room)], LIMIT_M)
     median_m, p95_m, p99_m = (round(float(value), 5) for value in np.quantile(distance_m, (0.5, 0.95, 0.99)))
     fraction = round(float((distance_m > FAR_M).mean()), 5)

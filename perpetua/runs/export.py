@@ -6,7 +6,7 @@ from pathlib import Path
 from perpetua.errors import InputError
 from perpetua.formats.reader import read_sequence
 from perpetua.formats.source import EXPORTERS, ExportSource
-from perpetua.pipeline.kept import kept_meshes, kept_object_index
+from perpetua.pipeline.work_area import load_meshes, load_object_index
 
 
 def load_source(sequence_folder: Path) -> ExportSource:
@@ -20,8 +20,8 @@ def load_source(sequence_folder: Path) -> ExportSource:
     sequence = read_sequence(sequence_folder)
     own = tuple(view.object_index for view in sequence.views if view.object_index is not None)
     complete = sequence.record is not None and len(own) == len(sequence.views)
-    object_index = own if complete else kept_object_index(sequence_folder)
-    return ExportSource(name, sequence, object_index, kept_meshes(sequence_folder))
+    object_index = own if complete else load_object_index(sequence_folder)
+    return ExportSource(name, sequence, object_index, load_meshes(sequence_folder))
 
 
 def export_sequence(sequence_folder: Path, export_format: str, target: Path) -> list[Path]:

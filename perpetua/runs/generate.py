@@ -12,7 +12,6 @@ from rich.console import Console
 from perpetua.actors.bodies.assembly import check_people
 from perpetua.cluster.local import raise_on_sigterm, run_rooms
 from perpetua.errors import ConfigError, InputError, PerpetuaError
-from perpetua.formats.layout import LOG_FILE
 from perpetua.io.files import read_json
 from perpetua.machine.devices import auto_workers
 from perpetua.machine.free_memory import free_memory_mb
@@ -24,7 +23,7 @@ from perpetua.pipeline.cost import (
     estimate_cost,
     gigabytes,
 )
-from perpetua.pipeline.layout import OutputLayout, check_writable, open_run, run_before
+from perpetua.pipeline.layout import check_writable, open_run, run_before
 from perpetua.pipeline.progress import Progress
 from perpetua.pipeline.room_work import GenerateRequest, note_failures, room_work
 from perpetua.pipeline.runner import published_redraw
@@ -100,7 +99,7 @@ def make_rooms(request: GenerateRequest, until: str, console: Console) -> dict[i
         workers = auto_workers(len(request.rooms), request.device, free_memory_mb(), work.memory_mb)
         _speaker(console)(f"rooms made at a time on this machine: {workers}")
     logging.getLogger("perpetua").setLevel(logging.INFO)
-    with Progress(request.out / LOG_FILE, len(request.rooms), request.config.cameras.count, console) as progress:
+    with Progress(request.layout.log_file, len(request.rooms), request.config.cameras.count, console) as progress:
         failures = run_rooms(request.rooms, workers, work, progress.show)
     note_failures(request, failures)
     return failures
@@ -122,7 +121,7 @@ def open_folder(request: GenerateRequest, until: str = STAGES[-1].name) -> None:
 
 def _refuse_outdated(request: GenerateRequest) -> None:
     for room in request.rooms:
-        layout = OutputLayout(request.out, request.config.export, request.seed, room)
+        layout = request.layout.room(room)
         if layout.sequence_folder.is_dir() and published_redraw(layout, request.config) is None:
             raise InputError(
                 f"'{layout.sequence_folder}' is not what this version of perpetua makes of these settings: choose "
@@ -134,14 +133,14 @@ def exit_code(request: GenerateRequest, failures: dict[int, str]) -> int:
     """0 without failures, 2 if all were for something that the user gave, else 1."""
     if not failures:
         return 0
-    layouts = [OutputLayout(request.out, request.config.export, request.seed, room) for room in failures]
+    layouts = [request.layout.room(room) for room in failures]
     codes = {read_json(layout.failure_file).get("exit_code") for layout in layouts}
     return InputError.exit_code if codes == {InputError.exit_code} else PerpetuaError.exit_code
 
 
 def _rooms_to_make(request: GenerateRequest) -> int:
     """Rooms without a sequence: finished ones need no more disk."""
-    layouts = (OutputLayout(request.out, request.config.export, request.seed, room) for room in request.rooms)
+    layouts = (request.layout.room(room) for room in request.rooms)
     return sum(not layout.sequence_folder.exists() for layout in layouts)
 
 
@@ -177,7 +176,7 @@ def _say_cost(request: GenerateRequest, cost: Cost, free_bytes: float, until: st
 def _say_result(request: GenerateRequest, failures: dict[int, str], until: str, console: Console) -> None:
     say = _speaker(console)
     for room in request.rooms:
-        layout = OutputLayout(request.out, request.config.export, request.seed, room)
+        layout = request.layout.room(room)
         if room in failures:
             say(f"room {room} failed: {failures[room]}")
         elif until == STAGE_NAMES[-1]:

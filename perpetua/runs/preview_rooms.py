@@ -19,18 +19,18 @@ from perpetua.machine.scripts import scripts_sha256
 from perpetua.machine.system_libraries import require_libraries
 from perpetua.navigation.types import NavGrid
 from perpetua.pipeline import codec
-from perpetua.pipeline.layout import OutputLayout, open_run, sequence_name
+from perpetua.pipeline.layout import RoomLayout, open_run, sequence_name
 from perpetua.pipeline.runner import RoomRun
 from perpetua.pipeline.stages import STAGES
-from perpetua.pipeline.store import StageFolder, key_of
+from perpetua.pipeline.store import key_of
 from perpetua.rendering.bake import BAKE_SCRIPT
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.job import RENDER_SCRIPT
 from perpetua.rendering.render import render_views
 from perpetua.report.pictures.room_views import HEIGHT_PX, TOP, WIDTH_PX, place_views
 from perpetua.rooms.acceptance.build import REPORT_FILE, check_source
-from perpetua.scene.filmed import RenderedView
 from perpetua.scene.room import Room
+from perpetua.scene.scene import RenderedView
 
 # Enough to judge a room by, and little work: few samples, few bounces, and materials baked coarsely.
 PICTURES = {"samples": 12, "max_bounces": 3, "noise_threshold": 0.1, "bake": True, "max_texels": 200_000}
@@ -73,13 +73,13 @@ def write_room_gallery(request: GalleryRequest, say: Callable[[str], None]) -> i
     """
     require_libraries()
     check_source(request.config.rooms)
-    open_run(request.out, request.seed, request.rooms, request.config, replace=False)
+    run = open_run(request.out, request.seed, request.rooms, request.config, replace=False)
     pictures = request.out / "pictures"
     pictures.mkdir(exist_ok=True)
     cards: list[tuple[int, RoomCard]] = []
     for index in request.rooms:
         try:
-            card = _card_of(request, index, pictures, say)
+            card = _card_of(request, run.layout(request.out).room(index), pictures, say)
         except PerpetuaError as error:
             card = RoomCard(f"room {index}", "", failure=str(error))
         say(f"{card.title}: {card.facts}" if card.failure is None else f"{card.title} failed: {card.failure}")
@@ -88,14 +88,14 @@ def write_room_gallery(request: GalleryRequest, say: Callable[[str], None]) -> i
     return sum(card.failure is not None for _, card in cards)
 
 
-def _card_of(request: GalleryRequest, index: int, pictures: Path, say: Callable[[str], None]) -> RoomCard:
+def _card_of(request: GalleryRequest, layout: RoomLayout, pictures: Path, say: Callable[[str], None]) -> RoomCard:
+    index = layout.number
     run = RoomRun(request.config, request.seed, index, request.out, request.device, lambda event: None)
-    run.run(LAST_STAGE)
-    layout = OutputLayout(request.out, request.config.export, request.seed, index)
-    folders = {stage.name: StageFolder(layout.work_folder, stage.number, stage.name).final for stage in STAGES}
+    run.run(LAST_STAGE, even_if_published=True)
+    folders = {stage.name: layout.stage(stage).final for stage in STAGES}
     scripts = scripts_sha256((BAKE_SCRIPT, RENDER_SCRIPT))
     key = key_of({"room": run.keys[LAST_STAGE], "scripts": scripts, "drawing": DRAWING_VERSION})
-    stem = pictures / sequence_name(request.seed, index)
+    stem = pictures / layout.name
     record = stem.with_suffix(".json")
     stored = read_json(record)
     if stored.get("key") == key and all(_picture(stem, name).is_file() for name in VIEW_NAMES):

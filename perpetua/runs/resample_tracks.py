@@ -7,9 +7,9 @@ from pathlib import Path
 from perpetua.errors import InputError
 from perpetua.formats.config import OUTPUTS
 from perpetua.formats.tapvid_mv import write_sequence
-from perpetua.pipeline.kept import KeptScene, load_kept_scene
 from perpetua.pipeline.record import sequence_record
 from perpetua.pipeline.store import replace_folder
+from perpetua.pipeline.work_area import StoredScene, load_scene
 from perpetua.seeding import StageSeed
 from perpetua.tracks.follow import TrackScene
 from perpetua.tracks.make import make_tracks
@@ -50,7 +50,7 @@ def write_other_tracks(
     """Writes the sequence once more with other tracks, a whole folder in the benchmark layout.
 
     Args:
-        sequence_folder: a finished sequence whose work area is kept.
+        sequence_folder: a finished sequence whose work area is stored.
         target: folder to write; must not exist.
         count: tracks to draw, with the run's other settings.
         seed: of the draw; the run's own seed and count give the sequence's own tracks.
@@ -58,22 +58,22 @@ def write_other_tracks(
         outputs: labels of every pixel to write, besides those of the run.
 
     Raises:
-        InputError: the work area is not kept, or ``target`` exists.
+        InputError: the work area is not stored, or ``target`` exists.
         TrackError: too few points are seen.
     """
     if target.exists():
         raise InputError(f"'{target}' exists: choose another --out, or remove it")
-    kept = load_kept_scene(sequence_folder)
-    tracks = _make(kept, count, seed, pixels)
+    stored = load_scene(sequence_folder)
+    tracks = _make(stored, count, seed, pixels)
     # The record says what the tracks are, which for pixels nobody chose.
     moving = float((travel_m(tracks.points.position_m) > MOVING_M).mean())
     made = {"count": len(tracks.queries_xytv)} | ({} if pixels is None else {"dynamic_share": moving, "min_visible": 1})
-    config = kept.run.config
+    config = stored.run.config
     labels = tuple(name for name in OUTPUTS if name in (*outputs, *config.export.outputs))
     export = config.export.model_copy(update={"outputs": labels})
     config = config.model_copy(update={"tracks": config.tracks.model_copy(update=made), "export": export})
-    scene = kept.scene
-    record = sequence_record(config, StageSeed(seed, kept.room_number, "tracks"), scene.room, kept.routes, scene.actors)
+    scene = stored.scene
+    record = sequence_record(config, StageSeed(seed, stored.room_number, "tracks"), scene, stored.routes)
     partial = target.with_name(f".{target.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     write_sequence(partial, scene, tracks, record, labels)
@@ -81,10 +81,9 @@ def write_other_tracks(
     return tracks
 
 
-def _make(kept: KeptScene, count: int, seed: int, pixels: PixelChoice | None) -> SequenceTracks:
-    config = kept.run.config.tracks.model_copy(update={"count": count})
-    filmed = kept.scene
-    scene = TrackScene(filmed.room, filmed.actors, filmed.cameras, filmed.views, config)
+def _make(stored: StoredScene, count: int, seed: int, pixels: PixelChoice | None) -> SequenceTracks:
+    config = stored.run.config.tracks.model_copy(update={"count": count})
+    scene = TrackScene(stored.scene, config)
     if pixels is not None:
         return make_pixel_tracks(scene, pixels.view, pixels.frame, pixels.step)
-    return make_tracks(scene, StageSeed(seed, kept.room_number, "tracks"))
+    return make_tracks(scene, StageSeed(seed, stored.room_number, "tracks"))

@@ -11,13 +11,11 @@ from perpetua.cluster.plan import LAST_OF_GEOMETRY, Plan, Resources, make_plan
 from perpetua.cluster.task import RoomsTask
 from perpetua.errors import InputError
 from perpetua.pipeline.cost import estimate_cost, gigabytes
-from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout, RunRecord
+from perpetua.pipeline.layout import RunRecord
 from perpetua.pipeline.lease import hold_when_free
 from perpetua.pipeline.room_work import GenerateRequest
 from perpetua.pipeline.stages import STAGES
 from perpetua.runs.generate import check_inputs, open_folder
-
-SLURM_FOLDER = "slurm"
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ def run_submit(request: SubmitRequest, console: Console, dry_run: bool) -> None:
             say(line)
         return
     slurm.require_slurm()
-    folder = generate.out.absolute() / WORK_FOLDER / SLURM_FOLDER
+    folder = generate.layout.slurm_folder.absolute()
     if generate.replace and slurm.scheduled_rooms(folder):
         raise InputError(
             f"tasks with the former settings of '{generate.out}' are scheduled: scancel them, then --replace"
@@ -65,9 +63,9 @@ def run_submit(request: SubmitRequest, console: Console, dry_run: bool) -> None:
 
 def _plan(request: SubmitRequest) -> Plan:
     generate = request.generate
-    folder = generate.out.absolute() / WORK_FOLDER / SLURM_FOLDER
+    folder = generate.layout.slurm_folder.absolute()
     run = RunRecord(generate.seed, tuple(generate.rooms), generate.config)
-    layouts = [OutputLayout(generate.out, generate.config.export, generate.seed, room) for room in generate.rooms]
+    layouts = [generate.layout.room(room) for room in generate.rooms]
     room_memory_mb = estimate_cost(generate.config, 1).room_memory_mb
     return make_plan(run, layouts, slurm.scheduled_rooms(folder), request.resources, room_memory_mb, slurm.most_tasks())
 
@@ -131,5 +129,5 @@ def _submit_array(
         # With aftercorr a task starts when its own task of the array before has ended well, and need not wait for all.
         kind = "aftercorr" if len(tasks) > 1 else "afterok"
         options["dependency"] = f"{kind}:{after.job}"
-    folder = on_node.out / WORK_FOLDER / SLURM_FOLDER
+    folder = on_node.layout.slurm_folder
     return slurm.submit_array(folder, functions, tasks, request.python, options)

@@ -1,12 +1,15 @@
 """What the room stage hands on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float64, UInt8
 
 from perpetua.geometry.mesh import TriMesh
+from perpetua.scene.surfaces import Surfaces
 
 PATTERNS = (
     "plain", "wood", "planks", "fabric", "velvet", "tile", "bricks", "plaster", "marble", "terrazzo", "brushed",
@@ -89,6 +92,24 @@ class Room:
     lights: tuple[AreaLight, ...]
     blend_path: Path | None
     sky: Sky | None = None
+
+    @cached_property
+    def surfaces(self) -> Surfaces:
+        """All objects. Kept, as are the next two: a room is joined, and a caster built for it, once per process."""
+        return self._joined(lambda obj: True)
+
+    @cached_property
+    def obstacles(self) -> Surfaces:
+        """What nobody may touch: all objects but those that are walked on."""
+        return self._joined(lambda obj: not obj.walkable)
+
+    @cached_property
+    def opaque(self) -> Surfaces:
+        """Objects that hide what is behind them."""
+        return self._joined(lambda obj: obj.opaque)
+
+    def _joined(self, wanted: Callable[[SceneObject], bool]) -> Surfaces:
+        return Surfaces.of({obj.object_index: obj.mesh for obj in self.objects if wanted(obj)})
 
     @property
     def next_object_index(self) -> int:

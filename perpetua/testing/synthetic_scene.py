@@ -13,14 +13,10 @@ from perpetua.geometry.raycast import Caster
 from perpetua.geometry.transforms import look_at
 from perpetua.scene.actor import ActorMesh, ActorPart, BodyMotion
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import FilmedScene, RenderedView
 from perpetua.scene.room import Material, Room, SceneObject
+from perpetua.scene.scene import RenderedView, Scene
 
 GREY = Material("grey", (0.5, 0.5, 0.5))
-
-
-# What the stages before the tracks would hand on.
-Scene = FilmedScene
 
 
 def tri(mesh: trimesh.Trimesh) -> TriMesh:
@@ -164,4 +160,4 @@ def make_scene(frames: int = 6, cameras: int = 3, width_px: int = 96, height_px:
     motions = tuple(make_motion(frames, k) for k in range(actors))
     people = tuple(make_actor(frames, k, room.next_object_index + k) for k in range(actors))
     paths = make_cameras(frames, cameras, width_px, height_px)
-    return Scene(room, motions, people, paths, tuple(render(room, people, path) for path in paths))
+    return Scene(room, people, paths, motions, tuple(render(room, people, path) for path in paths))

@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from perpetua.formats.tapvid_mv import write_sequence
+from perpetua.scene.scene import Scene
 from perpetua.seeding import StageSeed
-from perpetua.testing.synthetic_scene import Scene, make_scene
+from perpetua.testing.synthetic_scene import make_scene
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.follow import TrackScene
 from perpetua.tracks.make import make_tracks
@@ -15,7 +16,7 @@ CONFIG = TracksConfig(count=200)
 
 def make_scene_tracks(scene: Scene, config: TracksConfig = CONFIG, seed: int = 5) -> SequenceTracks:
     """Tracks of the synthetic scene."""
-    seen = TrackScene(scene.room, scene.actors, scene.cameras, scene.views, config)
+    seen = TrackScene(scene, config)
     return make_tracks(seen, StageSeed(seed, 0, "tracks"))
 
 

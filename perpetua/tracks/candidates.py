@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from perpetua.geometry.mesh import face_areas_m2, join
+from perpetua.geometry.mesh import face_areas_m2
 from perpetua.geometry.pinhole import unproject
 from perpetua.geometry.planes import Planes
-from perpetua.geometry.raycast import NO_FACE, Caster, MovingCaster
+from perpetua.geometry.raycast import NO_FACE, MovingCaster
 from perpetua.geometry.transforms import transform_points
 from perpetua.scene.actor import ActorMesh
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
+from perpetua.scene.scene import RenderedView
 from perpetua.tracks.sides import connected_surfaces
 from perpetua.tracks.surface import SceneMeshes, SurfacePoints, join_points, plane_barycentric
 
@@ -35,10 +35,7 @@ class StaticSurfaces:
 
     def __init__(self, meshes: SceneMeshes, cameras: tuple[CameraPath, ...], views: tuple[RenderedView, ...]) -> None:
         self.meshes, self.cameras, self.views = meshes, cameras, views
-        self.obj = np.array(sorted(meshes.static), np.int64)
-        parts = [meshes.static[index] for index in self.obj.tolist()]
-        self.caster = Caster(join(parts))
-        self.first_face = np.cumsum([0] + [len(part.faces) for part in parts])
+        self.surfaces = meshes.joined
 
     def draw(self, count: int, rng: np.random.Generator) -> SurfacePoints:
         """About ``count`` points, spread evenly over views and times, and in each image over objects."""
@@ -59,7 +56,7 @@ class StaticSurfaces:
 
     def _rays(self, view: int, frame: int, count: int, rng: np.random.Generator) -> PixelRays:
         shown = np.asarray(self.views[view].object_index[frame]).reshape(-1)
-        pixel = np.flatnonzero(np.isin(shown, self.obj))
+        pixel = np.flatnonzero(np.isin(shown, list(self.meshes.static)))
         if len(pixel) == 0:
             return PixelRays(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64))
         pixels_of = np.bincount(shown[pixel])
@@ -80,18 +77,17 @@ class StaticSurfaces:
         shown: Int64[np.ndarray, " N"],
     ) -> SurfacePoints:
         """The exact points where rays meet the object that their pixel shows; other rays are dropped."""
-        hits = self.caster.first_hit(origin_m, direction)
-        place = np.searchsorted(self.first_face, hits.face, side="right") - 1
+        hits = self.surfaces.caster.first_hit(origin_m, direction)
         found = np.flatnonzero(hits.hit)
-        found = found[self.obj[place[found]] == shown[found]]
-        joined = self.caster.mesh
+        found = found[self.surfaces.object_index[hits.face[found]] == shown[found]]
+        joined = self.surfaces.mesh
         corner_m = joined.vertices_m[joined.faces[hits.face[found]]]
         weight = plane_barycentric(_plane_point(origin_m[found], direction[found], corner_m), corner_m)
         sound = np.isfinite(weight).all(axis=1) & (weight > -1e-3).all(axis=1)
         weight = np.clip(weight[sound], 0.0, None)
         weight /= weight.sum(axis=1, keepdims=True)
-        face = hits.face[found] - self.first_face[place[found]]
-        return SurfacePoints(shown[found][sound].astype(np.int32), face[sound].astype(np.int32), weight)
+        face = self.surfaces.face[hits.face[found]]
+        return SurfacePoints(shown[found][sound].astype(np.int32), face[sound], weight)
 
 
 def _plane_point(

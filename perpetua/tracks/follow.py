@@ -3,10 +3,7 @@
 import numpy as np
 from jaxtyping import Int64
 
-from perpetua.scene.actor import ActorMesh
-from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
-from perpetua.scene.room import Room
+from perpetua.scene.scene import Scene
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.queries import draw_queries, project_tracks
 from perpetua.tracks.sides import SideTable
@@ -20,26 +17,16 @@ class TrackScene:
     """Everything that decides where a point is seen.
 
     Args:
-        room: its meshes as rendered.
-        actors: their meshes as rendered.
-        cameras: one per view, in the order of the views.
-        views: the rendered frames; arrays may lie on disk, and are read frame by frame.
+        scene: meshes as rendered, cameras, and the rendered views; arrays may lie on disk, and are read frame by frame.
         config: the tracks section of the config.
     """
 
-    def __init__(
-        self,
-        room: Room,
-        actors: tuple[ActorMesh, ...],
-        cameras: tuple[CameraPath, ...],
-        views: tuple[RenderedView, ...],
-        config: TracksConfig,
-    ) -> None:
-        self.actors, self.cameras, self.views, self.config = actors, cameras, views, config
-        self.meshes = SceneMeshes.of(room, actors)
-        self.frames = len(views[0].depth_m)
+    def __init__(self, scene: Scene, config: TracksConfig) -> None:
+        self.actors, self.cameras, self.views, self.config = scene.actors, scene.cameras, scene.views, config
+        self.meshes = SceneMeshes.of(scene)
+        self.frames = scene.frames
         self.sight = SceneSight(self.meshes)
-        self._hair, self._sides = hair_faces(actors), SideTable(self.meshes)
+        self._hair, self._sides = hair_faces(scene.actors), SideTable(self.meshes)
 
     def bind(self, points: SurfacePoints) -> BoundPoints:
         """Points with their triangles."""

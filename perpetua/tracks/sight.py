@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
-from perpetua.geometry.mesh import join
 from perpetua.geometry.planes import Planes
-from perpetua.geometry.raycast import NO_FACE, Caster, MovingCaster
+from perpetua.geometry.raycast import NO_FACE, MovingCaster
 from perpetua.scene.actor import ActorMesh
 from perpetua.tracks.surface import SceneMeshes
 
@@ -28,8 +27,7 @@ class SceneSight:
 
     def __init__(self, meshes: SceneMeshes) -> None:
         self.meshes = meshes
-        room = join(list(meshes.static.values()))
-        self._room, self._room_planes = Caster(room), Planes.of(room.vertices_m[room.faces])
+        self._room, self._room_planes = meshes.joined.caster, Planes.of(meshes.joined.corner_m)
         self._room_face = _FaceTable.of({index: len(mesh.faces) for index, mesh in meshes.static.items()})
         self._actors = MovingCaster(self._actor_vertices_m(0), _joined_actor_faces(meshes))
         self._actor_face = _FaceTable.of({index: len(faces) for index, faces in meshes.moving_faces.items()})

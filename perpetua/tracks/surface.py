@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int32, Int64, Integer
 
 from perpetua.geometry.mesh import TriMesh
-from perpetua.scene.actor import ActorMesh
-from perpetua.scene.room import Room
+from perpetua.scene.scene import Scene
+from perpetua.scene.surfaces import Surfaces
 
 
 @dataclass(frozen=True)
@@ -40,19 +40,29 @@ def join_points(groups: Sequence[SurfacePoints]) -> SurfacePoints:
 
 @dataclass(frozen=True)
 class SceneMeshes:
-    """What tracks can lie on: rigid opaque objects of the room, and actors, both by object index."""
+    """What tracks can lie on: rigid opaque objects of the room, and actors, both by object index.
+
+    ``joined`` has the rigid ones as one mesh.
+    """
 
     static: dict[int, TriMesh]
+    joined: Surfaces
     moving_vertices_m: dict[int, Float32[np.ndarray, "T P 3"]]
     moving_faces: dict[int, Int32[np.ndarray, "F 3"]]
 
     @classmethod
-    def of(cls, room: Room, actors: tuple[ActorMesh, ...]) -> "SceneMeshes":
+    def of_rigid(cls, meshes: dict[int, TriMesh]) -> "SceneMeshes":
+        """Rigid objects alone, by object index."""
+        return cls(meshes, Surfaces.of(meshes), {}, {})
+
+    @classmethod
+    def of(cls, scene: Scene) -> "SceneMeshes":
         """The meshes of a room and its actors."""
         return cls(
-            {obj.object_index: obj.mesh for obj in room.objects if obj.opaque},
-            {actor.object_index: actor.vertices_m for actor in actors},
-            {actor.object_index: actor.faces for actor in actors},
+            {obj.object_index: obj.mesh for obj in scene.room.objects if obj.opaque},
+            scene.room.opaque,
+            {actor.object_index: actor.vertices_m for actor in scene.actors},
+            {actor.object_index: actor.faces for actor in scene.actors},
         )
 
 

@@ -24,7 +24,7 @@ from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.planes import Planes
 from perpetua.geometry.transforms import invert_rigid
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
+from perpetua.scene.scene import RenderedView
 from perpetua.tracks.around import Around, ViewFrame
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.placed import PlacedPoints, Placement, as_exported

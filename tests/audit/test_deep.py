@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 import pytest
 
 from perpetua.audit.config import AuditConfig
-from perpetua.audit.deep_scene import DeepScene
 from perpetua.audit.verify import verify_sequence
 from perpetua.testing.synthetic_scene import make_scene
 from perpetua.testing.synthetic_sequence import write_scene
@@ -36,10 +36,10 @@ def sequence(good: Path, tmp_path: Path) -> Path:
 
 def _deep(folder: Path, with_index: bool = True, swapped: bool = False) -> dict[str, tuple[bool, float, str]]:
     scene = make_scene()
-    index = [view.object_index for view in scene.views]
+    views = list(scene.views)
     if swapped:
-        index[0], index[1] = index[1], index[0]
-    deep = DeepScene(scene.room, scene.actors, tuple(index) if with_index else None)
+        views[0], views[1] = views[1], views[0]
+    deep = replace(scene, views=tuple(views) if with_index else ())
     report = verify_sequence(folder, AuditConfig(), deep, FRAMES)
     return {check.name: (check.passed, check.value, check.detail) for check in report.checks if check.name in DEEP}
 
@@ -171,5 +171,5 @@ def test_object_indices_of_two_views_exchanged_are_caught(good: Path) -> None:
 def test_without_a_sound_table_of_tracks_no_rays_are_cast(sequence: Path) -> None:
     _record("face", lambda column: column.pop())(sequence)
     scene = make_scene()
-    report = verify_sequence(sequence, AuditConfig(), DeepScene(scene.room, scene.actors, None), FRAMES)
+    report = verify_sequence(sequence, AuditConfig(), scene, FRAMES)
     assert any("rays at the meshes: sequence.json must have one entry" in reason for reason in report.skipped)

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from perpetua.config import load_config
-from perpetua.pipeline.layout import OutputLayout
+from perpetua.pipeline.layout import RoomLayout, RunLayout
 from perpetua.pipeline.stages import STAGES
-from perpetua.pipeline.store import StageFolder, output_hashes
+from perpetua.pipeline.store import output_hashes
 from tests.support.waiting import wait_for
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
@@ -33,8 +33,8 @@ def _perpetua(*arguments: str, code: int = 0) -> str:
     return done.stdout
 
 
-def _layout(out: Path) -> OutputLayout:
-    return OutputLayout(out, load_config("tiny").export, SEED, ROOM)
+def _layout(out: Path) -> RoomLayout:
+    return RunLayout(out, load_config("tiny").export, SEED).room(ROOM)
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +165,7 @@ def test_third_of_three_rooms_is_the_room_made_alone(finished: Path, tmp_path: P
     for stage in STAGES:
         if stage.name == "render":
             break
-        folders = [StageFolder(_layout(out).work_folder, stage.number, stage.name) for out in (finished, tmp_path)]
+        folders = [_layout(out).stage(stage) for out in (finished, tmp_path)]
         alone, among_three = (folder.manifest() for folder in folders)
         assert alone is not None and among_three is not None
         assert alone.outputs == among_three.outputs, stage.name

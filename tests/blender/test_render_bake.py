@@ -21,8 +21,8 @@ from perpetua.rendering import bake
 from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
 from perpetua.scene.room import Room, SceneObject
+from perpetua.scene.scene import RenderedView
 
 pytestmark = pytest.mark.blender
 

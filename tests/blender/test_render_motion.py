@@ -13,7 +13,7 @@ from perpetua.rendering.config import RenderConfig
 from perpetua.rendering.render import render_views
 from perpetua.scene.actor import ActorMesh
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
+from perpetua.scene.scene import RenderedView
 from perpetua.seeding import StageSeed
 from tests.support.plane_scene import (
     CONFIG,

@@ -19,7 +19,7 @@ from perpetua.geometry.transforms import look_at, transform_points
 from perpetua.rendering.render import render_views
 from perpetua.scene.actor import ActorMesh
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
+from perpetua.scene.scene import RenderedView
 from tests.support.plane_scene import (
     ACTOR_INDEX,
     CONFIG,

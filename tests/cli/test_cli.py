@@ -199,12 +199,12 @@ def test_status_of_a_run_that_has_not_begun(tmp_path: Path) -> None:
 def test_sequences_of_another_version_are_named_and_kept(tmp_path: Path) -> None:
     from perpetua.config import load_config
     from perpetua.errors import InputError
-    from perpetua.pipeline.layout import OutputLayout
+    from perpetua.pipeline.layout import RunLayout
     from perpetua.pipeline.room_work import GenerateRequest
     from perpetua.runs.generate import open_folder
 
     (tmp_path / "run.json").write_text(json.dumps({"seed": 7, "rooms": [0, 1], "config": json.loads(_config_json())}))
-    sequence = OutputLayout(tmp_path, load_config("tiny").export, 7, 1).sequence_folder
+    sequence = RunLayout(tmp_path, load_config("tiny").export, 7).room(1).sequence_folder
     sequence.mkdir(parents=True)
     (sequence / "audit.json").write_text(json.dumps({"key": "another", "rejected_draws": 0}))
     report = json.loads(_perpetua("status", str(tmp_path), "--json").output)

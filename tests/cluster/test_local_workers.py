@@ -13,11 +13,11 @@ import pytest
 
 from perpetua.cluster import pool
 from perpetua.cluster.local import run_rooms
-from perpetua.cluster.outcome import ROOM_LOG
 from perpetua.errors import RouteError
 from perpetua.machine.devices import machine_share
 from perpetua.machine.free_memory import free_memory_mb
 from perpetua.pipeline.events import Event, OnEvent
+from perpetua.pipeline.layout import ROOM_LOG
 from perpetua.pipeline.lease import HEARTBEAT_S, SILENT_BEATS, hold
 from perpetua.pipeline.room_work import RoomWork
 from tests.support.waiting import wait_for

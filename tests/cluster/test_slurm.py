@@ -14,9 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from perpetua.cluster.outcome import ROOM_LOG
 from perpetua.config import load_config
-from perpetua.pipeline.layout import WORK_FOLDER, OutputLayout
+from perpetua.pipeline.layout import ROOM_LOG, WORK_FOLDER, RoomLayout, RunLayout
 from perpetua.pipeline.stages import STAGE_NAMES
 from perpetua.pipeline.store import output_hashes
 from tests.support.installed_wheel import build_wheel, copy_sources, install_wheel
@@ -76,8 +75,8 @@ class Installed:
         return done.stdout
 
 
-def _layout(out: Path, room: int) -> OutputLayout:
-    return OutputLayout(out, load_config("standard", SETTINGS).export, SEED, room)
+def _layout(out: Path, room: int) -> RoomLayout:
+    return RunLayout(out, load_config("standard", SETTINGS).export, SEED).room(room)
 
 
 def _jobs(folder: Path) -> list[str]:

@@ -16,7 +16,7 @@ from perpetua.formats.kubric import scene_number
 from perpetua.formats.reader import read_sequence
 from perpetua.formats.source import EXPORTERS, ExportSource
 from perpetua.runs.export import export_sequence
-from perpetua.testing.synthetic_scene import Scene
+from perpetua.scene.scene import Scene
 from perpetua.testing.synthetic_sequence import write_scene
 from perpetua.tracks.types import SequenceTracks
 

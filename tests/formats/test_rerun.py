@@ -14,9 +14,9 @@ from perpetua.cli.app import main
 from perpetua.formats.reader import Sequence, read_sequence
 from perpetua.formats.rerun_meshes import entity_name, vertex_colours, vertex_normals
 from perpetua.formats.rerun_recording import save_recording
-from perpetua.formats.source import ExportSource, KeptMeshes
+from perpetua.formats.source import ExportSource
 from perpetua.scene.room import Material
-from perpetua.testing.synthetic_scene import Scene
+from perpetua.scene.scene import Scene
 from perpetua.testing.synthetic_sequence import write_scene
 
 FRAMES, VIEWS = 6, 3
@@ -33,7 +33,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Scene]:
 def recording(made: tuple[Path, Scene], tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder, scene = made
     rendered = tuple(view.object_index for view in scene.views)
-    source = ExportSource("sequence", read_sequence(folder), rendered, KeptMeshes(scene.room, scene.actors))
+    source = ExportSource("sequence", read_sequence(folder), rendered, Scene(scene.room, scene.actors))
     target = tmp_path_factory.mktemp("recording") / "sequence.rrd"
     save_recording(source, target)
     return rerun.dataframe.load_recording(str(target))

@@ -8,7 +8,7 @@ import pytest
 from perpetua.config import load_config
 from perpetua.errors import ConfigError
 from perpetua.formats.config import ExportConfig, split_of_room
-from perpetua.pipeline.layout import OutputLayout, open_run, read_run, sequence_name
+from perpetua.pipeline.layout import RunLayout, open_run, read_run, sequence_name
 
 THREE = ExportConfig(splits={"train": 0.7, "val": 0.2, "test": 0.1})
 
@@ -64,13 +64,13 @@ def test_every_path_of_a_room_follows_its_split(tmp_path: Path) -> None:
     open_run(tmp_path, 7, range(3), config, False)
     stored = read_run(tmp_path).config.export
     for room in range(40):
-        layout = OutputLayout(tmp_path, config.export, 7, room)
+        layout = RunLayout(tmp_path, config.export, 7).room(room)
         assert layout.sequence_folder == tmp_path / split_of_room(THREE, 7, room) / sequence_name(7, room)
-        assert OutputLayout(tmp_path, stored, 7, room).sequence_folder == layout.sequence_folder
+        assert RunLayout(tmp_path, stored, 7).room(room).sequence_folder == layout.sequence_folder
 
 
 def test_the_folder_of_another_split_is_found_and_the_work_area_is_not(tmp_path: Path) -> None:
-    layout = OutputLayout(tmp_path, ExportConfig(), 7, 3)
+    layout = RunLayout(tmp_path, ExportConfig(), 7).room(3)
     for parent in ("train", "val", ".work", "mine"):
         (tmp_path / parent / "seed7-room0003").mkdir(parents=True)
     for parent in ("train", "val", ".work"):

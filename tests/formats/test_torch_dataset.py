@@ -12,7 +12,7 @@ from perpetua.formats.config import OUTPUTS
 from perpetua.formats.reader import Sequence, read_sequence
 from perpetua.formats.resize import PixelCentreResize
 from perpetua.formats.torch_dataset import Clip, SequenceDataset
-from perpetua.testing.synthetic_scene import Scene
+from perpetua.scene.scene import Scene
 from perpetua.testing.synthetic_sequence import write_scene
 
 FRAMES, VIEWS, WIDTH_PX, HEIGHT_PX, TRACKS = 6, 3, 96, 72, 200

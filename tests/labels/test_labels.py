@@ -14,7 +14,8 @@ from perpetua.formats.frame_file import FrameFile
 from perpetua.formats.label_files import write_labels
 from perpetua.formats.poses import object_poses, resting_pose
 from perpetua.labels import pixels
-from perpetua.testing.synthetic_scene import Scene, make_scene
+from perpetua.scene.scene import Scene
+from perpetua.testing.synthetic_scene import make_scene
 from perpetua.testing.synthetic_sequence import write_scene
 
 SHELL, ACTORS = 1, (5, 6)

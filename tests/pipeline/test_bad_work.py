@@ -11,8 +11,9 @@ import pytest
 from perpetua.config import Config
 from perpetua.errors import InputError
 from perpetua.io.files import read_json
-from perpetua.pipeline import codec, kept, store
+from perpetua.pipeline import codec, store, work_area
 from perpetua.pipeline.layout import read_run
+from perpetua.pipeline.stages import STAGES
 from tests.support.robustness import BadInput
 
 
@@ -115,7 +116,7 @@ def test_notes_that_cannot_be_read_say_nothing(tmp_path: Path, content: str) -> 
 
 
 def _finished(work: Path, name: str) -> store.StageFolder:
-    stage = next(stage for stage in kept.STAGES if stage.name == name)
+    stage = next(stage for stage in STAGES if stage.name == name)
     folder = store.StageFolder(work, stage.number, name)
     partial = folder.begin("key", resumable=False)
     codec.save((np.zeros(200_000), np.arange(3)), partial)
@@ -134,7 +135,7 @@ def test_damaged_work_is_not_used(tmp_path: Path, damage: str) -> None:
     sequence.mkdir(parents=True)
     (sequence / "tracks_xyz.npy").touch()
     with pytest.raises(InputError, match="is missing" if damage == "manifest" else r"a1\.npy' is not what was written"):
-        kept.load_kept_scene(sequence)
+        work_area.load_scene(sequence)
 
 
 def test_a_sequence_is_on_disk_before_it_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

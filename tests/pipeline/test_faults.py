@@ -15,7 +15,7 @@ from perpetua.config import Config
 from perpetua.errors import PerpetuaError
 from perpetua.pipeline.cost import check_disk, estimate_cost, require_room_space
 from perpetua.pipeline.events import Event
-from perpetua.pipeline.layout import OutputLayout, open_run
+from perpetua.pipeline.layout import RoomLayout, RunLayout, open_run
 from perpetua.pipeline.os_errors import DiskError, OutOfMemoryError, explained
 from perpetua.pipeline.runner import RoomRun
 from perpetua.pipeline.stages import Stage, StageContext
@@ -57,12 +57,12 @@ def _run(
     out: Path,
     room: Callable[[StageContext], object] = _room,
     keep: Literal["all", "tracks", "none"] = "all",
-) -> tuple[OutputLayout, list[str]]:
+) -> tuple[RoomLayout, list[str]]:
     config = Config.model_validate({"work": {"keep": keep}})
     events: list[Event] = []
     RoomRun(config, 3, 0, out, "cpu", events.append, _stages(room)).run("audit")
     computed = [event.stage for event in events if event.kind == "stage_finished"]
-    return OutputLayout(out, config.export, 3, 0), computed
+    return RunLayout(out, config.export, 3).room(0), computed
 
 
 @pytest.fixture(scope="module")
@@ -182,7 +182,7 @@ def test_what_is_kept_of_the_work_follows_the_policy(
     tmp_path: Path, keep: Literal["all", "tracks", "none"], left: set[str], undisturbed: dict[str, str]
 ) -> None:
     layout, computed = _run(tmp_path, keep=keep)
-    stages = {stage.name: StageFolder(layout.work_folder, stage.number, stage.name).final for stage in _stages()}
+    stages = {stage.name: layout.stage(stage).final for stage in _stages()}
     assert {name for name, folder in stages.items() if folder.exists()} == left
     assert output_hashes(layout.sequence_folder) == undisturbed
     assert computed == ["room", "export", "audit"]

@@ -13,9 +13,9 @@ import pytest
 
 from perpetua.config import Config
 from perpetua.errors import AuditError, RouteError
-from perpetua.pipeline.layout import OutputLayout
+from perpetua.pipeline.layout import RoomLayout, RunLayout
 from perpetua.pipeline.runner import RoomRun, stage_keys
-from perpetua.pipeline.stages import STAGES, Stage, StageContext
+from perpetua.pipeline.stages import Stage, StageContext, UndeclaredInputError
 
 RunCount = Counter[str]
 
@@ -44,7 +44,7 @@ def _table(ran: RunCount, fail: str = "") -> tuple[Stage, ...]:
         return None
 
     def audit(context: StageContext) -> object:
-        number = int((context.stage_folders["export"] / "sequence" / "number.txt").read_text())
+        number = int((context.folder_of("export") / "sequence" / "number.txt").read_text())
         (context.folder / "audit.json").write_text(json.dumps({"number": number}))
         return None
 
@@ -57,10 +57,10 @@ def _table(ran: RunCount, fail: str = "") -> tuple[Stage, ...]:
 
 def _run(
     out: Path, ran: RunCount, config: Config | None = None, room: int = 0, fail: str = "", until: str = "audit"
-) -> OutputLayout:
+) -> RoomLayout:
     config = config or Config()
     RoomRun(config, 7, room, out, "cpu", lambda event: None, _table(ran, fail)).run(until)
-    return OutputLayout(out, config.export, 7, room)
+    return RunLayout(out, config.export, 7).room(room)
 
 
 def test_finished_room_is_published_and_not_computed_again(tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ def test_failure_is_recorded_and_forgotten_when_mended(tmp_path: Path) -> None:
     ran: RunCount = Counter()
     with pytest.raises(AuditError):
         _run(tmp_path, ran, fail="export")
-    layout = OutputLayout(tmp_path, Config().export, 7, 0)
+    layout = RunLayout(tmp_path, Config().export, 7).room(0)
     assert json.loads(layout.failure_file.read_text()) == {
         "stage": "export", "reason": "export does not work out", "exit_code": 1,
     }  # fmt: skip
@@ -180,10 +180,40 @@ def test_room_does_not_depend_on_the_others(tmp_path: Path) -> None:
     assert len(set(numbers)) == 3
 
 
-def test_every_setting_that_a_sequence_depends_on_is_in_some_key() -> None:
-    base = stage_keys(Config(), 0, 0)
-    assert stage_keys(Config(), 1, 0)["room"] != base["room"]
-    assert stage_keys(Config(), 0, 1)["room"] != base["room"]
-    longer = stage_keys(Config.model_validate({"sequence": {"frames": 9}}), 0, 0)
-    changed = {name for name in base if base[name] != longer[name]}
-    assert changed == {stage.name for stage in STAGES} - {"room", "navigation"}
+def test_a_published_room_is_made_again_as_it_was_where_its_stages_are_asked_for(tmp_path: Path) -> None:
+    tried: list[int] = []
+    run = partial(RoomRun, Config(), 7, 0, tmp_path, "cpu", lambda event: None, _drawn_until(2, tried))
+    run().run("audit")
+    shutil.rmtree(tmp_path / ".work")
+    again = run()
+    again.run("routes", even_if_published=True)
+    assert tried == [0, 1, 2, 2]
+    assert (
+        again.keys["routes"]
+        == json.loads((tmp_path / ".work/seed7-room0000/30_routes/manifest.json").read_text())["key"]
+    )
+
+
+@pytest.mark.parametrize("read", ["upstream", "folder_of"])
+def test_a_stage_that_reads_what_it_does_not_declare_fails_at_once(tmp_path: Path, read: str) -> None:
+    room, export, audit = _table(Counter())
+    sly = replace(audit, run=lambda context: getattr(context, read)("room"))
+    with pytest.raises(UndeclaredInputError, match="stage 'audit' reads 'room', which its row"):
+        RoomRun(Config(), 7, 0, tmp_path, "cpu", lambda event: None, (room, export, sly)).run("audit")
+
+
+def test_what_stages_share_is_made_once_a_room_and_freed_with_it(tmp_path: Path) -> None:
+    made: list[int] = []
+
+    def share(context: StageContext) -> object:
+        if "bodies" not in context.shared:
+            made.append(context.seed.room)
+            context.shared["bodies"] = "drawn"
+        return (1,)
+
+    first, second = (Stage(number, name, 1, (), _section("rooms"), share) for number, name in ((10, "a"), (20, "b")))
+    for room in (0, 1):
+        run = RoomRun(Config(), 7, room, tmp_path, "cpu", lambda event: None, (first, second, *_table(Counter())))
+        run.run("b")
+        assert run.shared == {}
+    assert made == [0, 1]

@@ -17,8 +17,8 @@ from perpetua.rendering.frames import drop_damaged, frame_folder
 from perpetua.rendering.render import render_views
 from perpetua.scene.actor import ActorMesh
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
 from perpetua.scene.room import Material, Room, SceneObject
+from perpetua.scene.scene import RenderedView
 
 WIDTH_PX, HEIGHT_PX, FRAMES = 8, 6, 4
 

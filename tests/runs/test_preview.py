@@ -20,7 +20,7 @@ from perpetua.report.pictures.object_sheet import write_object_sheet
 from perpetua.report.pictures.sheets import CELL_WIDTH_PX, GAP_PX, HEADING_PX, MARGIN_PX
 from perpetua.report.pictures.track_marks import choose_tracks, draw_tracks
 from perpetua.runs.export import load_source
-from perpetua.testing.synthetic_scene import Scene
+from perpetua.scene.scene import Scene
 from perpetua.testing.synthetic_sequence import write_scene
 
 # The synthetic scene: 6 frames of 2 or more views of 96 x 72 px.

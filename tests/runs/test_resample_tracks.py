@@ -13,7 +13,7 @@ from perpetua.cli.app import main
 from perpetua.errors import InputError, SequenceFormatError
 from perpetua.geometry.pinhole import project
 from perpetua.geometry.transforms import invert_rigid, transform_points
-from perpetua.pipeline.kept import load_deep_scene
+from perpetua.pipeline.work_area import load_scene
 from perpetua.runs.resample_tracks import PixelChoice, write_other_tracks
 from perpetua.testing.synthetic_scene import make_scene
 from tests.support.small_run import write_run
@@ -30,7 +30,7 @@ def sequence(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_any_number_is_written_as_a_whole_sequence_that_passes(sequence: Path, tmp_path: Path) -> None:
     made = write_other_tracks(sequence, tmp_path / "more", 300, 3, None)
     assert made.points.position_m.shape == (6, 300, 3)
-    report = verify_sequence(tmp_path / "more", AuditConfig(), load_deep_scene(sequence), 2)
+    report = verify_sequence(tmp_path / "more", AuditConfig(), load_scene(sequence).scene, 2)
     assert report.passed, [str(check) for check in report.checks if not check.passed]
     assert not report.skipped
     again = write_other_tracks(sequence, tmp_path / "again", 300, 3, None)
@@ -49,14 +49,14 @@ def test_pixels_are_followed_from_their_centres(sequence: Path, tmp_path: Path) 
     np.testing.assert_allclose(pixel_px, step * np.round(pixel_px / step), atol=2e-3)
     assert len(pixel_px) > 0.95 * (96 / step) * (72 / step)
     assert made.views.visible[view, frame].mean() > 0.98, "they are seen where they come from"
-    report = verify_sequence(tmp_path / "pixels", AuditConfig(), load_deep_scene(sequence), 2)
+    report = verify_sequence(tmp_path / "pixels", AuditConfig(), load_scene(sequence).scene, 2)
     assert report.passed, [str(check) for check in report.checks if not check.passed]
 
 
 def test_bad_requests_are_refused_with_a_remedy(sequence: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"exists: choose another --out"):
         write_other_tracks(sequence, tmp_path, 5, 0, None)
-    with pytest.raises(InputError, match=r"work area of .* is not kept"):
+    with pytest.raises(InputError, match=r"work area of .* is gone"):
         write_other_tracks(shutil.copytree(sequence, tmp_path / "elsewhere"), tmp_path / "new", 5, 0, None)
     with pytest.raises(SequenceFormatError, match=r"is not the folder of a sequence"):
         write_other_tracks(sequence.parent, tmp_path / "new", 5, 0, None)

@@ -17,11 +17,11 @@ from perpetua.config import Config
 from perpetua.errors import InputError, PerpetuaError
 from perpetua.io.files import write_json
 from perpetua.pipeline.events import Event
-from perpetua.pipeline.layout import OutputLayout, RunRecord
+from perpetua.pipeline.layout import RoomLayout, RunLayout, RunRecord
 from perpetua.pipeline.room_work import GenerateRequest
 from perpetua.pipeline.runner import stage_keys
 from perpetua.pipeline.stages import STAGES
-from perpetua.pipeline.store import Manifest, StageFolder
+from perpetua.pipeline.store import Manifest
 
 SEED = 7
 RESOURCES = Resources(
@@ -37,25 +37,25 @@ RESOURCES = Resources(
 ROOM_MB = 2000.0
 
 
-def _layouts(out: Path, rooms: int) -> list[OutputLayout]:
-    return [OutputLayout(out, Config().export, SEED, room) for room in range(rooms)]
+def _layouts(out: Path, rooms: int) -> list[RoomLayout]:
+    return [RunLayout(out, Config().export, SEED).room(room) for room in range(rooms)]
 
 
 def _run(rooms: int) -> RunRecord:
     return RunRecord(SEED, tuple(range(rooms)), Config())
 
 
-def _publish(layout: OutputLayout) -> None:
-    key = stage_keys(Config(), SEED, layout.room)[STAGES[-1].name]
+def _publish(layout: RoomLayout) -> None:
+    key = stage_keys(Config(), SEED, layout.number)[STAGES[-1].name]
     write_json(layout.sequence_folder / "audit.json", {"key": key, "rejected_draws": 0})
 
 
-def _finish_geometry(layout: OutputLayout) -> None:
+def _finish_geometry(layout: RoomLayout) -> None:
     stage = next(stage for stage in STAGES if stage.name == "cameras")
-    folder = StageFolder(layout.work_folder, stage.number, stage.name)
-    key = stage_keys(Config(), SEED, layout.room)[stage.name]
+    folder = layout.stage(stage)
+    key = stage_keys(Config(), SEED, layout.number)[stage.name]
     folder.begin(key, resumable=False)
-    folder.finish(Manifest(key, stage.name, stage.version, SEED, layout.room, {}, {}, 1.0, 1.0))
+    folder.finish(Manifest(key, stage.name, stage.version, SEED, layout.number, {}, {}, 1.0, 1.0))
 
 
 def test_only_what_is_missing_is_planned(tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_a_task_that_comes_no_further_is_not_queued_for_ever(
 
 def test_rooms_without_geometry_are_not_tried_where_a_gpu_waits(tmp_path: Path) -> None:
     for layout in _layouts(tmp_path, 2):
-        write_json(layout.failure_file, {"stage": "routes", "reason": f"too narrow {layout.room}", "exit_code": 1})
+        write_json(layout.failure_file, {"stage": "routes", "reason": f"too narrow {layout.number}", "exit_code": 1})
     task = _task(tmp_path, "audit")
     assert task._failed_geometry() == {0: "too narrow 0", 1: "too narrow 1"}
     _finish_geometry(_layouts(tmp_path, 2)[0])

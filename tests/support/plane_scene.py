@@ -9,8 +9,8 @@ from perpetua.geometry.transforms import look_at
 from perpetua.rendering.config import RenderConfig
 from perpetua.scene.actor import ActorMesh, ActorPart
 from perpetua.scene.camera import CameraPath
-from perpetua.scene.filmed import RenderedView
 from perpetua.scene.room import AreaLight, Material, Room, SceneObject
+from perpetua.scene.scene import RenderedView
 
 FRAMES = 3
 PLANE_INDEX, ACTOR_INDEX = 7, 41

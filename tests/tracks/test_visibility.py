@@ -46,7 +46,7 @@ class ClearSight(SceneSight):
     """Nothing stands in any way."""
 
     def __init__(self) -> None:
-        super().__init__(SceneMeshes({}, {}, {}))
+        super().__init__(SceneMeshes.of_rigid({}))
 
     def first_hit(self, frame: int, eye_m: np.ndarray, directions: np.ndarray) -> SightHits:
         nothing = np.zeros(len(directions), np.int32)
@@ -123,7 +123,7 @@ def test_the_inside_of_a_sleeve_is_seen_through_its_opening() -> None:
     points = weight @ corner_m
     closed = ClosedSides(np.ones(50, bool), np.zeros((50, 2, 3)))
     for order in ([0, 1, 2], [0, 2, 1]):
-        sight = SceneSight(SceneMeshes({7: TriMesh(corner_m, np.array([order], np.int32))}, {}, {}))
+        sight = SceneSight(SceneMeshes.of_rigid({7: TriMesh(corner_m, np.array([order], np.int32))}))
         lying = placed(points, np.repeat(corner_m[None, order], 50, axis=0), closed)
         first = dataclasses.replace(lying, face=np.zeros(50, np.int32))
         shown, _ = visible_in_frame(first, [seen], sight, HairFaces({}), CONFIG)
@@ -227,7 +227,7 @@ def test_hidden_entries_are_counted_by_reason() -> None:
     for gap_m, wanted in ((0.005, "blocked_coincident"), (0.5, "blocked_thin")):
         corner_m = np.array([[-9.0, -9, 3 - gap_m], [9, -9, 3 - gap_m], [0, 18, 3 - gap_m]])
         sheet = TriMesh(corner_m, np.array([[0, 1, 2]], np.int32))
-        sight = SceneSight(SceneMeshes({8: sheet}, {}, {}))
+        sight = SceneSight(SceneMeshes.of_rigid({8: sheet}))
         shown, report = visible_in_frame(placed(points, corners), [seen], sight, HairFaces({}), CONFIG)
         assert not shown.any() and getattr(report, wanted) == len(points) and report.visible == 0
         _, strands = visible_in_frame(placed(points, corners), [seen], sight, HairFaces({8: np.array([True])}), CONFIG)
@@ -247,7 +247,7 @@ def test_a_rim_between_pixels_is_counted_as_an_edge() -> None:
     ridge_m = np.array([[0.9, -9.0, 2.6], [1.1, -9.0, 2.6], [1.0, 9.0, 2.6]]) * [size_m, 1.0, 1.0]
     wall_m = np.array([[-9.0, -9, 3], [9, -9, 3], [0, 18, 3]])
     mesh = TriMesh(np.concatenate([wall_m, ridge_m]), np.array([[0, 1, 2], [3, 4, 5]], np.int32))
-    sight = SceneSight(SceneMeshes({7: mesh}, {}, {}))
+    sight = SceneSight(SceneMeshes.of_rigid({7: mesh}))
     weight = np.random.default_rng(2).dirichlet(np.ones(3), 50)
     weight[:, 2] = 0.5
     weight[:, :2] *= 0.5 / weight[:, :2].sum(axis=1, keepdims=True)

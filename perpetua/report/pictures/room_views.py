@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from perpetua.geometry.mesh import join
 from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.raycast import Caster
 from perpetua.scene.camera import CameraPath
@@ -40,7 +39,7 @@ class RoomViews:
 def place_views(room: Room) -> RoomViews:
     """A view from above and two from opposite corners at eye height, where furniture does not block them."""
     top, near_m = _from_above(room)
-    caster = Caster(join([obj.mesh for obj in room.objects]))
+    caster = room.surfaces.caster
     low_m, high_m = room.floor_polygon_m.min(0), room.floor_polygon_m.max(0)
     diagonals = [
         (np.array([low_m[0], low_m[1]]), np.array([high_m[0], high_m[1]])),
