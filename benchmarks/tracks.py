@@ -29,7 +29,7 @@ from perpetua.seeding import StageSeed
 from perpetua.tracks.config import TracksConfig
 from perpetua.tracks.follow import TrackScene
 from perpetua.tracks.make import make_tracks
-from perpetua.tracks.sight import SceneSight
+from perpetua.tracks.ray_caster import SceneRayCaster
 from perpetua.tracks.surface import SceneMeshes, SurfacePoints
 from perpetua.tracks.types import SequenceTracks
 
@@ -82,7 +82,7 @@ def _images(
     frames = len(cameras[0].world_from_camera)
     if not (given.images / "done").exists():
         given.images.mkdir(parents=True, exist_ok=True)
-        _cast_images(given, SceneSight(SceneMeshes.of(Scene(room, actors))), cameras)
+        _cast_images(given, SceneRayCaster(SceneMeshes.of(Scene(room, actors))), cameras)
         (given.images / "done").touch()
     views = []
     for camera in cameras:
@@ -91,7 +91,7 @@ def _images(
     return tuple(views)
 
 
-def _cast_images(given: Given, sight: SceneSight, cameras: tuple[CameraPath, ...]) -> None:
+def _cast_images(given: Given, ray_caster: SceneRayCaster, cameras: tuple[CameraPath, ...]) -> None:
     size = cameras[0].intrinsics
     shape = (len(cameras[0].world_from_camera), size.height_px, size.width_px)
     row, column = np.mgrid[: size.height_px, : size.width_px].reshape(2, -1)
@@ -105,7 +105,7 @@ def _cast_images(given: Given, sight: SceneSight, cameras: tuple[CameraPath, ...
         ray = np.stack([x, y, np.ones(row.size)], axis=1)
         for frame in range(0, shape[0], given.hold):
             pose, held = camera.world_from_camera[frame], slice(frame, frame + given.hold)
-            hits = sight.first_hit(frame, pose[:3, 3].copy(), ray @ pose[:3, :3].T)
+            hits = ray_caster.first_hit(frame, pose[:3, 3].copy(), ray @ pose[:3, :3].T)
             along_m = np.where(hits.object_index > 0, hits.distance_m / np.linalg.norm(ray, axis=1), 0.0)
             depth_m[held], index[held] = along_m.reshape(shape[1:]), hits.object_index.reshape(shape[1:])
 

@@ -40,7 +40,7 @@ from perpetua.audit.verify import find_sequences
 from perpetua.errors import InputError
 from perpetua.pipeline.work_area import load_scene
 from perpetua.scene.scene import Scene
-from perpetua.tracks.sight import HairFaces, hair_faces
+from perpetua.tracks.ray_caster import HairFaces, hair_faces
 
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 # What Blender writes where there is no surface.

@@ -8,7 +8,7 @@ from jaxtyping import Float64, UInt8
 from perpetua.geometry.pinhole import inside_image, project
 from perpetua.geometry.transforms import transform_points
 from perpetua.labels.pixels import LabelledScene, PixelSurfaces
-from perpetua.tracks.sight import NOTHING
+from perpetua.tracks.ray_caster import NOTHING
 from perpetua.tracks.visibility import REACHED_FRACTION, REACHED_M
 
 # States of a pixel's point in another image.
@@ -54,7 +54,7 @@ def flow(scene: LabelledScene, surfaces: PixelSurfaces, view: int, frame: int) -
     chosen = np.flatnonzero(inside)
     eye_m = -pose[:3, 3] @ pose[:3, :3]
     offset_m = point_m[chosen] - eye_m
-    met = scene.sight.first_hit(frame, eye_m, offset_m)
+    met = scene.ray_caster.first_hit(frame, eye_m, offset_m)
     points = surfaces.bound.points
     length_m = np.linalg.norm(offset_m, axis=1)
     reached = met.distance_m >= length_m * (1.0 - REACHED_FRACTION) - REACHED_M

@@ -14,8 +14,8 @@ from perpetua.geometry.pinhole import Intrinsics
 from perpetua.geometry.transforms import invert_rigid, transform_points
 from perpetua.scene.scene import Scene
 from perpetua.tracks.pixel_hits import hit_pixels
-from perpetua.tracks.placed import as_exported
-from perpetua.tracks.sight import SceneSight
+from perpetua.tracks.points_at_frame import as_exported
+from perpetua.tracks.ray_caster import SceneRayCaster
 from perpetua.tracks.surface import BoundPoints, SceneMeshes, bind
 from perpetua.tracks.visibility import SAME_DEPTH_FRACTION, SAME_DEPTH_M, exported_intrinsics
 
@@ -47,7 +47,7 @@ class LabelledScene:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.sight = SceneSight(SceneMeshes.of(scene))
+        self.ray_caster = SceneRayCaster(SceneMeshes.of(scene))
         self.cameras = tuple(
             ExportedCamera(exported_intrinsics(camera), as_exported(invert_rigid(camera.world_from_camera)))
             for camera in scene.cameras
@@ -65,10 +65,10 @@ class LabelledScene:
         row, column = np.divmod(np.arange(block.start, block.stop), camera.intrinsics.width_px)
         pixel_px = np.stack([column, row], axis=1).astype(np.float64)
         pose = camera.camera_from_world[frame]
-        hits = hit_pixels(self.sight, camera.intrinsics, invert_rigid(pose), frame, pixel_px)
+        hits = hit_pixels(self.ray_caster, camera.intrinsics, invert_rigid(pose), frame, pixel_px)
         agreed = self._agrees(view, frame, block, hits.place, hits.bound, pose)
         place = hits.place[agreed]
-        kept = bind(self.sight.meshes, hits.bound.points.take(agreed))
+        kept = bind(self.ray_caster.meshes, hits.bound.points.take(agreed))
         return PixelSurfaces(view, frame, block.start + place, pixel_px[place], kept)
 
     def _agrees(

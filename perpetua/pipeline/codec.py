@@ -22,7 +22,7 @@ from perpetua.scene.actor import ActorMesh, ActorPart, BodyMotion, Dwell, Route,
 from perpetua.scene.camera import CameraPath
 from perpetua.scene.room import AreaLight, Material, Room, SceneObject, Sky
 from perpetua.scene.scene import RenderedView
-from perpetua.tracks.types import PointTracks, SequenceTracks, SightReport, ViewTracks
+from perpetua.tracks.types import PointTracks, SequenceTracks, ViewTracks, VisibilityReport
 
 VALUE_FILE = "value.json"
 ARRAY_FILE = "arrays.npz"
@@ -32,9 +32,11 @@ STORED_TYPES = {
     stored.__name__: stored
     for stored in (
         ActorMesh, ActorPart, AreaLight, BodyMotion, CameraPath, Dwell, Intrinsics, Material, NavGrid, PointTracks,
-        RenderedView, Room, Route, SceneObject, Seat, SequenceTracks, Sky, SightReport, TriMesh, ViewTracks,
+        RenderedView, Room, Route, SceneObject, Seat, SequenceTracks, Sky, VisibilityReport, TriMesh, ViewTracks,
     )
 }  # fmt: skip
+# Names that types had in older work areas.
+OLD_NAMES = {"SightReport": "VisibilityReport"}
 
 
 class DamagedValueError(PerpetuaError):
@@ -145,7 +147,8 @@ class _Reader:
             return self._inside(tree["@path"])
         if "@tuple" in tree:
             return tuple(self.decode(item) for item in tree["@tuple"])
-        stored = STORED_TYPES[tree["@type"]]
+        name: str = tree["@type"]
+        stored = STORED_TYPES[OLD_NAMES.get(name, name)]
         return stored(**{name: self.decode(value) for name, value in tree["fields"].items()})
 
     def _array(self, name: str) -> np.ndarray:

@@ -58,7 +58,8 @@ SEQUENCE_FOLDER = "sequence"
 ACTOR_FIGURES = "validation.json"
 CAMERA_FIGURES = "plan.json"
 MOTION_FIGURES = "motion.json"
-SIGHT_FIGURES = "sight.json"
+# Named as in older work areas, which stay readable.
+VISIBILITY_FIGURES = "sight.json"
 # Where Blender's job and its finished frames lie, inside the folder of the render stage.
 RENDER_JOB_FOLDER = "job"
 
@@ -297,7 +298,7 @@ def _scene(context: StageContext) -> Scene:
 
 def _tracks(context: StageContext) -> SequenceTracks:
     tracks = make_tracks(TrackScene(_scene(context), context.config.tracks), context.seed)
-    write_json(context.folder / SIGHT_FIGURES, asdict(tracks.report))
+    write_json(context.folder / VISIBILITY_FIGURES, asdict(tracks.report))
     return tracks
 
 
@@ -316,7 +317,7 @@ def _audit(context: StageContext) -> None:
         "actors": read_json(context.folder_of("actors") / ACTOR_FIGURES),
         "cameras": read_json(context.folder_of("cameras") / CAMERA_FIGURES),
         "motion": read_json(context.folder_of("cameras") / MOTION_FIGURES),
-        "visibility": read_json(context.folder_of("tracks") / SIGHT_FIGURES),
+        "visibility": read_json(context.folder_of("tracks") / VISIBILITY_FIGURES),
     }
     write_json(context.folder / layout.AUDIT, figures)
     if not report.passed:

@@ -13,8 +13,8 @@ from perpetua.geometry.transforms import transform_points
 from perpetua.scene.actor import ActorMesh
 from perpetua.scene.camera import CameraPath
 from perpetua.scene.scene import RenderedView
-from perpetua.tracks.sides import connected_surfaces
 from perpetua.tracks.surface import SceneMeshes, SurfacePoints, join_points, plane_barycentric
+from perpetua.tracks.watertight import connected_surfaces
 
 SAMPLED_IMAGES = 64
 COVER_M = 0.04

@@ -35,4 +35,6 @@ def _points(scene: TrackScene, view: int, frame: int, step: int) -> SurfacePoint
     camera = scene.cameras[view]
     row, column = np.mgrid[: camera.intrinsics.height_px : step, : camera.intrinsics.width_px : step].reshape(2, -1)
     pixel_px = np.stack([column, row], axis=1).astype(np.float64)
-    return hit_pixels(scene.sight, camera.intrinsics, camera.world_from_camera[frame], frame, pixel_px).bound.points
+    return hit_pixels(
+        scene.ray_caster, camera.intrinsics, camera.world_from_camera[frame], frame, pixel_px
+    ).bound.points

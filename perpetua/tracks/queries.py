@@ -6,7 +6,7 @@ from jaxtyping import Bool, Float32, Float64
 from perpetua.geometry.pinhole import project
 from perpetua.geometry.transforms import invert_rigid, transform_points
 from perpetua.scene.camera import CameraPath
-from perpetua.tracks.placed import as_exported
+from perpetua.tracks.points_at_frame import as_exported
 from perpetua.tracks.types import ViewTracks
 from perpetua.tracks.visibility import exported_intrinsics
 

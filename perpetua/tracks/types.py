@@ -29,7 +29,7 @@ class ViewTracks:
 
 
 @dataclass(frozen=True)
-class SightReport:
+class VisibilityReport:
     """How image and ray agreed about (view, frame, track) entries; where they differ the entry counts as hidden.
 
     ``blocked_*``: the image shows the point's surface at a pixel around it, and the exact ray is stopped: by or on
@@ -54,8 +54,8 @@ class SightReport:
     unseen_edge: int = 0
     unseen_otherwise: int = 0
 
-    def __add__(self, other: "SightReport") -> "SightReport":
-        return SightReport(*(getattr(self, field.name) + getattr(other, field.name) for field in fields(self)))
+    def __add__(self, other: "VisibilityReport") -> "VisibilityReport":
+        return VisibilityReport(*(getattr(self, field.name) + getattr(other, field.name) for field in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -65,4 +65,4 @@ class SequenceTracks:
     points: PointTracks
     views: ViewTracks
     queries_xytv: Float32[np.ndarray, "N 4"]
-    report: SightReport
+    report: VisibilityReport

@@ -11,7 +11,7 @@ Two witnesses are asked.
   seen only where the ray meets its own triangle first, as through the opening of a sleeve; elsewhere its front hides
   it, however thin the object is.
 
-A point is visible where both say so. Where they differ it is hidden, and counted by the reason (``SightReport``).
+A point is visible where both say so. Where they differ it is hidden, and counted by the reason (``VisibilityReport``).
 """
 
 from collections.abc import Sequence
@@ -25,13 +25,13 @@ from perpetua.geometry.planes import Planes
 from perpetua.geometry.transforms import invert_rigid
 from perpetua.scene.camera import CameraPath
 from perpetua.scene.scene import RenderedView
-from perpetua.tracks.around import Around, ViewFrame
 from perpetua.tracks.config import TracksConfig
-from perpetua.tracks.placed import PlacedPoints, Placement, as_exported
-from perpetua.tracks.sides import ClosedSides
-from perpetua.tracks.sight import HairFaces, SceneSight
+from perpetua.tracks.pixel_neighbourhood import PixelNeighbourhood, ViewFrame
+from perpetua.tracks.points_at_frame import PointsAtFrame, PointsOverTime, as_exported
+from perpetua.tracks.ray_caster import HairFaces, SceneRayCaster
 from perpetua.tracks.surface import BoundPoints
-from perpetua.tracks.types import SightReport
+from perpetua.tracks.types import VisibilityReport
+from perpetua.tracks.watertight import WatertightFaces
 
 # A ray has reached its point this far before it. Which triangle it meets is known to single precision, how far that is
 # to double, so no more is needed than where two triangles meet at an edge.
@@ -46,11 +46,11 @@ GRAZING_COSINE = float(np.cos(np.radians(80.0)))
 
 
 @dataclass(frozen=True)
-class Sightings:
+class ViewVisibility:
     """Where points are visible at the frames asked for, and how the witnesses agreed."""
 
     visible: Bool[np.ndarray, "C S N"]
-    report: SightReport
+    report: VisibilityReport
 
 
 def exported_intrinsics(camera: CameraPath) -> Intrinsics:
@@ -62,20 +62,20 @@ def exported_intrinsics(camera: CameraPath) -> Intrinsics:
 
 def visible_in_views(
     bound: BoundPoints,
-    sides: ClosedSides,
-    sight: SceneSight,
+    watertight: WatertightFaces,
+    ray_caster: SceneRayCaster,
     hair: HairFaces,
     cameras: tuple[CameraPath, ...],
     views: tuple[RenderedView, ...],
     frames: Int64[np.ndarray, " S"],
     config: TracksConfig,
-) -> Sightings:
+) -> ViewVisibility:
     """Whether each point is seen by each camera at some frames; frame by frame, so that views may lie on disk."""
     visible = np.zeros((len(cameras), len(frames), len(bound.points)), bool)
     intrinsics = [exported_intrinsics(camera) for camera in cameras]
     camera_from_world = [as_exported(invert_rigid(camera.world_from_camera)) for camera in cameras]
-    report = SightReport()
-    placement = Placement(bound, sides)
+    report = VisibilityReport()
+    placement = PointsOverTime(bound, watertight)
     for place, frame in enumerate(frames.tolist()):
         seen = [
             ViewFrame(
@@ -87,43 +87,43 @@ def visible_in_views(
             )
             for index, view in enumerate(views)
         ]
-        visible[:, place], counted = visible_in_frame(placement.at(frame), seen, sight, hair, config)
+        visible[:, place], counted = visible_in_frame(placement.at(frame), seen, ray_caster, hair, config)
         report = report + counted
-    return Sightings(visible, report)
+    return ViewVisibility(visible, report)
 
 
 def visible_in_frame(
-    placed: PlacedPoints, views: Sequence[ViewFrame], sight: SceneSight, hair: HairFaces, config: TracksConfig
-) -> tuple[Bool[np.ndarray, "C N"], SightReport]:
+    placed: PointsAtFrame, views: Sequence[ViewFrame], ray_caster: SceneRayCaster, hair: HairFaces, config: TracksConfig
+) -> tuple[Bool[np.ndarray, "C N"], VisibilityReport]:
     """Whether points are seen in each image of one frame, and how the two witnesses agreed."""
-    around = Around.of(placed.point_m, views)
-    points = placed.take(around.point)
-    shows = around.valid & (around.shown == points.object_index[:, None])
-    offset_m = points.point_m - around.eye_m
-    hits = sight.first_hit(views[0].frame, around.eye_m, offset_m)
+    neighbourhood = PixelNeighbourhood.of(placed.point_m, views)
+    points = placed.take(neighbourhood.point)
+    shows = neighbourhood.valid & (neighbourhood.shown == points.object_index[:, None])
+    offset_m = points.point_m - neighbourhood.eye_m
+    hits = ray_caster.first_hit(views[0].frame, neighbourhood.eye_m, offset_m)
     length_m = np.sqrt(np.einsum("nc,nc->n", offset_m, offset_m))
-    height_m = points.planes.height_m(around.eye_m)
+    height_m = points.planes.height_m(neighbourhood.eye_m)
     cosine = np.abs(height_m) / np.maximum(length_m, 1e-30)
     own = (hits.object_index == points.object_index) & (hits.face == points.face)
     reached = own | (hits.distance_m >= length_m * (1.0 - REACHED_FRACTION) - REACHED_M)
-    turned = (height_m <= 0.0) & points.sides.hide_back(around.eye_m) & ~own
+    turned = (height_m <= 0.0) & points.watertight.hide_back(neighbourhood.eye_m) & ~own
     reached &= ~turned
-    agrees = (shows & _on_plane(points.planes, height_m, around, config)).any(axis=1)
+    agrees = (shows & _on_plane(points.planes, height_m, neighbourhood, config)).any(axis=1)
     unsure = np.flatnonzero(reached & ~agrees & shows.any(axis=1))
-    reach_m = NEIGHBOUR_PX * length_m * around.pixel_rad / np.maximum(cosine, GRAZING_COSINE)
+    reach_m = NEIGHBOUR_PX * length_m * neighbourhood.pixel_rad / np.maximum(cosine, GRAZING_COSINE)
     as_meshed = np.zeros(len(reached), bool)
     agrees[unsure], as_meshed[unsure] = _on_neighbours(
-        points.point_m, reach_m, unsure, shows, around, sight, views[0].frame
+        points.point_m, reach_m, unsure, shows, neighbourhood, ray_caster, views[0].frame
     )
     visible = np.zeros((len(views), len(placed.point_m)), bool)
-    visible[around.view, around.point] = reached & agrees
+    visible[neighbourhood.view, neighbourhood.point] = reached & agrees
     findings = _Findings(
         reached=reached,
         agrees=agrees,
         hair=hair.has(points.object_index, points.face) | (~reached & hair.has(hits.object_index, hits.face)),
         coincident=(length_m - hits.distance_m < COINCIDENT_M) | turned,
         grazing=cosine < GRAZING_COSINE,
-        blocker_shown=(around.valid & (around.shown == hits.object_index[:, None])).any(axis=1),
+        blocker_shown=(neighbourhood.valid & (neighbourhood.shown == hits.object_index[:, None])).any(axis=1),
         object_shown=shows.any(axis=1),
         as_meshed=as_meshed,
     )
@@ -131,12 +131,12 @@ def visible_in_frame(
 
 
 def _on_plane(
-    planes: Planes, height_m: Float64[np.ndarray, " M"], around: Around, config: TracksConfig
+    planes: Planes, height_m: Float64[np.ndarray, " M"], neighbourhood: PixelNeighbourhood, config: TracksConfig
 ) -> Bool[np.ndarray, "M 4"]:
     """Whether rendered depth is that of each point's own plane along the rays of the pixel centres."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        plane_m = -height_m[:, None] / np.einsum("nc,nkc->nk", planes.normal, around.direction)
-        in_front_m = plane_m - around.depth_m
+        plane_m = -height_m[:, None] / np.einsum("nc,nkc->nk", planes.normal, neighbourhood.direction)
+        in_front_m = plane_m - neighbourhood.depth_m
         return np.asarray(
             np.isfinite(plane_m)
             & (plane_m > 0.0)
@@ -150,20 +150,20 @@ def _on_neighbours(
     reach_m: Float64[np.ndarray, " M"],
     chosen: Int64[np.ndarray, " U"],
     shows: Bool[np.ndarray, "M 4"],
-    around: Around,
-    sight: SceneSight,
+    neighbourhood: PixelNeighbourhood,
+    ray_caster: SceneRayCaster,
     frame: int,
 ) -> tuple[Bool[np.ndarray, " U"], Bool[np.ndarray, " U"]]:
     """Whether some pixel around that shows the point's object was rendered where its ray meets a triangle near the
     point; and whether all pixels around that show it were rendered where their rays meet it, near or not."""
     member, corner = np.nonzero(shows[chosen])
     pair = chosen[member]
-    direction, eye_m = around.direction[pair, corner], around.eye_m[pair]
-    hits = sight.first_hit(frame, eye_m, direction)
+    direction, eye_m = neighbourhood.direction[pair, corner], neighbourhood.eye_m[pair]
+    hits = ray_caster.first_hit(frame, eye_m, direction)
     meshed_m = hits.distance_m / np.linalg.norm(direction, axis=1)
-    rendered_m = around.depth_m[pair, corner]
+    rendered_m = neighbourhood.depth_m[pair, corner]
     same = np.abs(meshed_m - rendered_m) <= SAME_DEPTH_M + SAME_DEPTH_FRACTION * rendered_m
-    same &= hits.object_index == around.shown[pair, corner]
+    same &= hits.object_index == neighbourhood.shown[pair, corner]
     as_meshed = np.ones(len(chosen), bool)
     np.logical_and.at(as_meshed, member, same)
     hit_m = eye_m + direction * np.where(np.isfinite(meshed_m), meshed_m, 0.0)[:, None]
@@ -192,12 +192,12 @@ class _Findings:
     as_meshed: Bool[np.ndarray, " N"]
 
 
-def _count(entries: int, found: _Findings) -> SightReport:
+def _count(entries: int, found: _Findings) -> VisibilityReport:
     """Counts entries by what the witnesses said and, where they differ, by the first reason that applies."""
     blocked, unseen = found.agrees & ~found.reached, found.reached & ~found.agrees
     of_blocked = _first_reason(blocked, found.hair, found.coincident, found.grazing, ~found.blocker_shown)
     of_unseen = _first_reason(unseen, found.hair, found.grazing, ~found.object_shown, found.as_meshed)
-    return SightReport(
+    return VisibilityReport(
         entries=entries,
         inside=len(found.reached),
         visible=int((found.reached & found.agrees).sum()),

@@ -9,6 +9,7 @@ from perpetua.geometry.mesh import TriMesh
 from perpetua.pipeline import codec
 from perpetua.pipeline.store import output_hashes
 from perpetua.scene.room import AreaLight, Material, Room, SceneObject
+from perpetua.tracks.types import VisibilityReport
 
 
 def _room(folder: Path, big: int = 10) -> Room:
@@ -94,3 +95,10 @@ def test_damaged_or_hostile_value_is_refused(tmp_path: Path, tree: object) -> No
 
 def test_every_stored_type_is_a_dataclass_of_its_own_name() -> None:
     assert all(dataclasses.is_dataclass(kind) and kind.__name__ == name for name, kind in codec.STORED_TYPES.items())
+
+
+def test_a_type_under_its_old_name_is_read(tmp_path: Path) -> None:
+    codec.save(VisibilityReport(entries=7, visible=3), tmp_path)
+    stored = tmp_path / codec.VALUE_FILE
+    stored.write_text(stored.read_text().replace("VisibilityReport", "SightReport"))
+    assert codec.load(tmp_path) == VisibilityReport(entries=7, visible=3)

@@ -11,13 +11,13 @@ from perpetua.geometry.pinhole import Intrinsics, inside_image, project
 from perpetua.geometry.planes import Planes
 from perpetua.testing.synthetic_scene import make_scene, tri
 from perpetua.testing.synthetic_sequence import make_scene_tracks
-from perpetua.tracks.around import ViewFrame
 from perpetua.tracks.config import TracksConfig
-from perpetua.tracks.placed import PlacedPoints
-from perpetua.tracks.sides import ClosedSides, closed_sides
-from perpetua.tracks.sight import HairFaces, SceneSight, SightHits
+from perpetua.tracks.pixel_neighbourhood import ViewFrame
+from perpetua.tracks.points_at_frame import PointsAtFrame
+from perpetua.tracks.ray_caster import HairFaces, SceneRayCaster, SceneRayHits
 from perpetua.tracks.surface import SceneMeshes, plane_barycentric
 from perpetua.tracks.visibility import visible_in_frame
+from perpetua.tracks.watertight import WatertightFaces, watertight_faces
 
 CONFIG = TracksConfig()
 CAMERA = Intrinsics.centred(64, 48, 1.2)
@@ -38,25 +38,27 @@ def slanted_wall(slope: float) -> tuple[np.ndarray, np.ndarray, ViewFrame]:
     return points, corners, seen
 
 
-def open_sides(count: int) -> ClosedSides:
-    return ClosedSides(np.zeros(count, bool), np.zeros((count, 2, 3)))
+def open_sides(count: int) -> WatertightFaces:
+    return WatertightFaces(np.zeros(count, bool), np.zeros((count, 2, 3)))
 
 
-class ClearSight(SceneSight):
+class ClearRayCaster(SceneRayCaster):
     """Nothing stands in any way."""
 
     def __init__(self) -> None:
         super().__init__(SceneMeshes.of_rigid({}))
 
-    def first_hit(self, frame: int, eye_m: np.ndarray, directions: np.ndarray) -> SightHits:
+    def first_hit(self, frame: int, eye_m: np.ndarray, directions: np.ndarray) -> SceneRayHits:
         nothing = np.zeros(len(directions), np.int32)
-        return SightHits(nothing, nothing, np.full(len(directions), np.inf))
+        return SceneRayHits(nothing, nothing, np.full(len(directions), np.inf))
 
 
-def placed(points: np.ndarray, corners: np.ndarray, sides: ClosedSides | None = None) -> PlacedPoints:
+def placed(points: np.ndarray, corners: np.ndarray, watertight: WatertightFaces | None = None) -> PointsAtFrame:
     count = len(points)
     index, face = np.full(count, 7, np.int32), np.arange(count, dtype=np.int32)
-    return PlacedPoints(points, Planes.of(corners), index, face, open_sides(count) if sides is None else sides)
+    return PointsAtFrame(
+        points, Planes.of(corners), index, face, open_sides(count) if watertight is None else watertight
+    )
 
 
 def visible(
@@ -64,9 +66,9 @@ def visible(
     corners: np.ndarray,
     seen: ViewFrame,
     config: TracksConfig = CONFIG,
-    sides: ClosedSides | None = None,
+    watertight: WatertightFaces | None = None,
 ) -> np.ndarray:
-    return visible_in_frame(placed(points, corners, sides), [seen], ClearSight(), HairFaces({}), config)[0][0]
+    return visible_in_frame(placed(points, corners, watertight), [seen], ClearRayCaster(), HairFaces({}), config)[0][0]
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.9, -1.3])
@@ -108,11 +110,11 @@ def test_points_behind_the_camera_and_off_the_image_are_not_visible() -> None:
 def test_backs_of_closed_surfaces_are_hidden_even_when_thin() -> None:
     points, corners, seen = slanted_wall(0.0)
     box = np.repeat(np.array([[[-5.0, -5.0, 2.9], [5.0, 5.0, 3.1]]]), len(points), axis=0)
-    closed = ClosedSides(np.ones(len(points), bool), box)
-    assert not visible(points, corners, seen, sides=closed).any()
-    assert visible(points, corners[:, ::-1], seen, sides=closed).all()
-    around = ClosedSides(closed.closed, np.tile([[-9.0] * 3, [9.0] * 3], (len(points), 1, 1)))
-    assert visible(points, corners, seen, sides=around).all(), "a room is seen from inside"
+    closed = WatertightFaces(np.ones(len(points), bool), box)
+    assert not visible(points, corners, seen, watertight=closed).any()
+    assert visible(points, corners[:, ::-1], seen, watertight=closed).all()
+    around = WatertightFaces(closed.closed, np.tile([[-9.0] * 3, [9.0] * 3], (len(points), 1, 1)))
+    assert visible(points, corners, seen, watertight=around).all(), "a room is seen from inside"
 
 
 def test_the_inside_of_a_sleeve_is_seen_through_its_opening() -> None:
@@ -121,12 +123,12 @@ def test_the_inside_of_a_sleeve_is_seen_through_its_opening() -> None:
     corner_m = np.array([[-9.0, -9, 3], [9, -9, 3], [0, 18, 3]])
     weight = np.random.default_rng(4).dirichlet(np.full(3, 20.0), 50)
     points = weight @ corner_m
-    closed = ClosedSides(np.ones(50, bool), np.zeros((50, 2, 3)))
+    closed = WatertightFaces(np.ones(50, bool), np.zeros((50, 2, 3)))
     for order in ([0, 1, 2], [0, 2, 1]):
-        sight = SceneSight(SceneMeshes.of_rigid({7: TriMesh(corner_m, np.array([order], np.int32))}))
+        ray_caster = SceneRayCaster(SceneMeshes.of_rigid({7: TriMesh(corner_m, np.array([order], np.int32))}))
         lying = placed(points, np.repeat(corner_m[None, order], 50, axis=0), closed)
         first = dataclasses.replace(lying, face=np.zeros(50, np.int32))
-        shown, _ = visible_in_frame(first, [seen], sight, HairFaces({}), CONFIG)
+        shown, _ = visible_in_frame(first, [seen], ray_caster, HairFaces({}), CONFIG)
         inside = inside_image(CAMERA, project(CAMERA, points))
         assert inside.sum() > 20
         np.testing.assert_array_equal(shown[0], inside)
@@ -139,12 +141,12 @@ def test_closed_open_and_inverted_surfaces_are_told_apart() -> None:
     split = trimesh.Trimesh(ball.triangles.reshape(-1, 3), np.arange(960).reshape(-1, 3), process=False)
     for mesh, closed in ((ball, True), (split, True), (bowl, False), (shell, False)):
         given = tri(mesh)
-        assert (closed_sides(given.vertices_m, given.faces).closed == closed).all()
+        assert (watertight_faces(given.vertices_m, given.faces).closed == closed).all()
     bowl.apply_translation([5.0, 0.0, 0.0])
     both = join([tri(ball), tri(bowl)])
-    sides = closed_sides(both.vertices_m, both.faces)
-    assert sides.closed.sum() == len(ball.faces) and sides.closed[: len(ball.faces)].all()
-    np.testing.assert_allclose(sides.box_m[0], ball.bounds, atol=1e-12)
+    watertight = watertight_faces(both.vertices_m, both.faces)
+    assert watertight.closed.sum() == len(ball.faces) and watertight.closed[: len(ball.faces)].all()
+    np.testing.assert_allclose(watertight.box_m[0], ball.bounds, atol=1e-12)
 
 
 def test_barycentric_weights_give_the_point_back() -> None:
@@ -227,16 +229,18 @@ def test_hidden_entries_are_counted_by_reason() -> None:
     for gap_m, wanted in ((0.005, "blocked_coincident"), (0.5, "blocked_thin")):
         corner_m = np.array([[-9.0, -9, 3 - gap_m], [9, -9, 3 - gap_m], [0, 18, 3 - gap_m]])
         sheet = TriMesh(corner_m, np.array([[0, 1, 2]], np.int32))
-        sight = SceneSight(SceneMeshes.of_rigid({8: sheet}))
-        shown, report = visible_in_frame(placed(points, corners), [seen], sight, HairFaces({}), CONFIG)
+        ray_caster = SceneRayCaster(SceneMeshes.of_rigid({8: sheet}))
+        shown, report = visible_in_frame(placed(points, corners), [seen], ray_caster, HairFaces({}), CONFIG)
         assert not shown.any() and getattr(report, wanted) == len(points) and report.visible == 0
-        _, strands = visible_in_frame(placed(points, corners), [seen], sight, HairFaces({8: np.array([True])}), CONFIG)
+        _, strands = visible_in_frame(
+            placed(points, corners), [seen], ray_caster, HairFaces({8: np.array([True])}), CONFIG
+        )
         assert strands.blocked_hair == len(points)
     elsewhere = ViewFrame(0, np.eye(4), CAMERA, seen.depth_m, np.full((48, 64), 8, np.uint16))
-    _, thin = visible_in_frame(placed(points, corners), [elsewhere], ClearSight(), HairFaces({}), CONFIG)
+    _, thin = visible_in_frame(placed(points, corners), [elsewhere], ClearRayCaster(), HairFaces({}), CONFIG)
     assert thin.unseen_thin == len(points)
     moved = ViewFrame(0, np.eye(4), CAMERA, seen.depth_m - np.float32(0.05), seen.object_index)
-    _, other = visible_in_frame(placed(points, corners), [moved], ClearSight(), HairFaces({}), CONFIG)
+    _, other = visible_in_frame(placed(points, corners), [moved], ClearRayCaster(), HairFaces({}), CONFIG)
     assert other.unseen_otherwise == len(points)
 
 
@@ -247,16 +251,16 @@ def test_a_rim_between_pixels_is_counted_as_an_edge() -> None:
     ridge_m = np.array([[0.9, -9.0, 2.6], [1.1, -9.0, 2.6], [1.0, 9.0, 2.6]]) * [size_m, 1.0, 1.0]
     wall_m = np.array([[-9.0, -9, 3], [9, -9, 3], [0, 18, 3]])
     mesh = TriMesh(np.concatenate([wall_m, ridge_m]), np.array([[0, 1, 2], [3, 4, 5]], np.int32))
-    sight = SceneSight(SceneMeshes.of_rigid({7: mesh}))
+    ray_caster = SceneRayCaster(SceneMeshes.of_rigid({7: mesh}))
     weight = np.random.default_rng(2).dirichlet(np.ones(3), 50)
     weight[:, 2] = 0.5
     weight[:, :2] *= 0.5 / weight[:, :2].sum(axis=1, keepdims=True)
     on_ridge = placed(weight @ ridge_m, np.repeat(ridge_m[None], 50, axis=0))
     on_ridge = dataclasses.replace(on_ridge, face=np.ones(50, np.int32))
-    shown, report = visible_in_frame(on_ridge, [seen], sight, HairFaces({}), CONFIG)
+    shown, report = visible_in_frame(on_ridge, [seen], ray_caster, HairFaces({}), CONFIG)
     assert not shown.any() and report.unseen_edge == 50, report
     bent = ViewFrame(0, np.eye(4), CAMERA, seen.depth_m + np.float32(0.5), seen.object_index)
-    assert visible_in_frame(on_ridge, [bent], sight, HairFaces({}), CONFIG)[1].unseen_otherwise == 50
+    assert visible_in_frame(on_ridge, [bent], ray_caster, HairFaces({}), CONFIG)[1].unseen_otherwise == 50
 
 
 def test_projection_uses_the_exported_values() -> None:

@@ -29,7 +29,7 @@ class ViewFrame:
 
 
 @dataclass(frozen=True)
-class Around:
+class PixelNeighbourhood:
     """Each pair of a view and a point inside its image, and the four pixel centres around the projection.
 
     ``view`` and ``point`` say which pair, ``eye_m`` where the view's camera is, ``pixel_rad`` what a pixel spans.
@@ -47,12 +47,12 @@ class Around:
     direction: Float64[np.ndarray, "M 4 3"]
 
     @classmethod
-    def of(cls, point_m: Float64[np.ndarray, "N 3"], views: Sequence[ViewFrame]) -> "Around":
+    def of(cls, point_m: Float64[np.ndarray, "N 3"], views: Sequence[ViewFrame]) -> "PixelNeighbourhood":
         """The pairs of all views, view by view."""
         return _join([cls._in_view(point_m, number, seen) for number, seen in enumerate(views)])
 
     @classmethod
-    def _in_view(cls, point_m: Float64[np.ndarray, "N 3"], number: int, seen: ViewFrame) -> "Around":
+    def _in_view(cls, point_m: Float64[np.ndarray, "N 3"], number: int, seen: ViewFrame) -> "PixelNeighbourhood":
         inner = seen.intrinsics
         pixel_px = project(inner, transform_points(seen.camera_from_world, point_m))
         point = np.flatnonzero(inside_image(inner, pixel_px))
@@ -74,5 +74,7 @@ class Around:
         )
 
 
-def _join(parts: list[Around]) -> Around:
-    return Around(*(np.concatenate([getattr(part, name) for part in parts]) for name in Around.__dataclass_fields__))
+def _join(parts: list[PixelNeighbourhood]) -> PixelNeighbourhood:
+    return PixelNeighbourhood(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in PixelNeighbourhood.__dataclass_fields__)
+    )

@@ -14,15 +14,15 @@ OPEN_EDGE_FRACTION = 0.03
 
 
 @dataclass(frozen=True)
-class ClosedSides:
+class WatertightFaces:
     """Per face, or per point on a face: whether its back is the inside of a closed surface, and that surface's box."""
 
     closed: Bool[np.ndarray, " N"]
     box_m: Float64[np.ndarray, "N 2 3"]
 
-    def take(self, chosen: Int64[np.ndarray, " M"] | Bool[np.ndarray, " N"]) -> "ClosedSides":
+    def take(self, chosen: Int64[np.ndarray, " M"] | Bool[np.ndarray, " N"]) -> "WatertightFaces":
         """Some of them."""
-        return ClosedSides(self.closed[chosen], self.box_m[chosen])
+        return WatertightFaces(self.closed[chosen], self.box_m[chosen])
 
     def hide_back(self, eye_m: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Whether the back is hidden from a camera: it is unless that is inside, as a closed room is seen."""
@@ -30,36 +30,36 @@ class ClosedSides:
         return np.asarray(self.closed & ~inside)
 
 
-class SideTable:
+class WatertightTable:
     """The closed surfaces of a scene, found once per object and only for objects that are asked for."""
 
     def __init__(self, meshes: SceneMeshes) -> None:
         self.meshes = meshes
-        self._known: dict[int, ClosedSides] = {}
+        self._known: dict[int, WatertightFaces] = {}
 
-    def of(self, points: SurfacePoints) -> ClosedSides:
+    def of(self, points: SurfacePoints) -> WatertightFaces:
         """Looks up points. Boxes of actors are empty: cameras keep their distance and are never inside one."""
         closed, box_m = np.zeros(len(points), bool), np.zeros((len(points), 2, 3))
         for object_index in np.unique(points.object_index).tolist():
             members = np.flatnonzero(points.object_index == object_index)
-            sides = self._of_object(object_index)
-            closed[members] = sides.closed[points.face[members]]
+            watertight = self._of_object(object_index)
+            closed[members] = watertight.closed[points.face[members]]
             if object_index in self.meshes.static:
-                box_m[members] = sides.box_m[points.face[members]]
-        return ClosedSides(closed, box_m)
+                box_m[members] = watertight.box_m[points.face[members]]
+        return WatertightFaces(closed, box_m)
 
-    def _of_object(self, object_index: int) -> ClosedSides:
+    def _of_object(self, object_index: int) -> WatertightFaces:
         if object_index not in self._known:
             if object_index in self.meshes.static:
                 mesh = self.meshes.static[object_index]
-                self._known[object_index] = closed_sides(mesh.vertices_m, mesh.faces)
+                self._known[object_index] = watertight_faces(mesh.vertices_m, mesh.faces)
             else:
                 vertices_m = self.meshes.moving_vertices_m[object_index][0]
-                self._known[object_index] = closed_sides(vertices_m, self.meshes.moving_faces[object_index])
+                self._known[object_index] = watertight_faces(vertices_m, self.meshes.moving_faces[object_index])
         return self._known[object_index]
 
 
-def closed_sides(vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray, "F 3"]) -> ClosedSides:
+def watertight_faces(vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray, "F 3"]) -> WatertightFaces:
     """Finds connected surfaces that are closed, consistently wound, and face outwards.
 
     Vertices at one position count as one, because seams of textures split them. A surface is closed when at most
@@ -78,7 +78,7 @@ def closed_sides(vertices_m: Float[np.ndarray, "P 3"], faces: Integer[np.ndarray
     np.minimum.at(low_m, surface, triangle_m.min(axis=1))
     np.maximum.at(high_m, surface, triangle_m.max(axis=1))
     closed = outward & (open_edges <= OPEN_EDGE_FRACTION * edges)
-    return ClosedSides(closed[surface], np.stack([low_m, high_m], axis=1)[surface])
+    return WatertightFaces(closed[surface], np.stack([low_m, high_m], axis=1)[surface])
 
 
 def connected_surfaces(

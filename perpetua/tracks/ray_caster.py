@@ -14,7 +14,7 @@ NOTHING = 0
 
 
 @dataclass(frozen=True)
-class SightHits:
+class SceneRayHits:
     """What rays meet first: object (0: nothing), face of that object, distance along the ray."""
 
     object_index: Int32[np.ndarray, " N"]
@@ -22,7 +22,7 @@ class SightHits:
     distance_m: Float64[np.ndarray, " N"]
 
 
-class SceneSight:
+class SceneRayCaster:
     """Casts rays at all that is opaque, at one frame at a time."""
 
     def __init__(self, meshes: SceneMeshes) -> None:
@@ -38,7 +38,7 @@ class SceneSight:
         frame: int,
         eye_m: Float64[np.ndarray, "3"] | Float64[np.ndarray, "N 3"],
         directions: Float64[np.ndarray, "N 3"],
-    ) -> SightHits:
+    ) -> SceneRayHits:
         """What each ray, from one place or each from its own, meets first at a frame; directions need not have unit
         length.
 
@@ -59,7 +59,7 @@ class SceneSight:
         distance_m[on_room] = planes.along_m(eye_m[on_room], unit[on_room], room.distance_m[on_room])
         planes = Planes.of(self._actors.corner_m(actors.face[on_actor]))
         distance_m[on_actor] = planes.along_m(eye_m[on_actor], unit[on_actor], actors.distance_m[on_actor])
-        return SightHits(object_index, face, distance_m)
+        return SceneRayHits(object_index, face, distance_m)
 
     def _go_to(self, frame: int) -> None:
         if frame != self._frame:
